@@ -52,7 +52,7 @@ class Competence(Judge):
         self._row: int | None = None
 
     def __call__(self, context: Array, goal: Array, outcomes: Array | None = None) -> float:
-        """Competence in [-1, 0], -1 for an empty memory; the ``outcomes`` of the attempt are in memory already.
+        """Competence in [-1, 0], -1 for an empty memory; ``outcomes`` is not used, as they are in memory already.
 
         Further calls with the same context and goal, as during an attempt, compare only newer exemplars.
         """

@@ -208,7 +208,7 @@ def tile_side(outcomes: Array, box: Box, tiles: int = TILES) -> float:
 
 
 def _reached(outcomes: Array, box: Box, side: float) -> Array:
-    """``(n_tiles, dim)``, tiles of T with two outcomes or more: sorted numbers from T's lower corner, by dimension."""
+    """``(n_tiles, dim)``, tiles of T with two outcomes or more, numbered in each dimension from T's lower corner."""
     inside = outcomes[box.contains(outcomes)]
     tiles = np.floor((inside - box.low) / side)
     per_side = np.floor(box.sides / side) + 1

@@ -117,7 +117,7 @@ class Trained(ABC):
 
     @abstractmethod
     def listener(self, life: Any) -> Any:
-        """A `runs.listeners.Listener` that calls `refresh` in this `runs.run.Life`."""
+        """Listener (`runs.listeners.Listener`) that calls `refresh` in the run ``life`` (`runs.run.Life`)."""
 
 
 class Goals(Part):

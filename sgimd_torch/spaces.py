@@ -140,7 +140,7 @@ class Box:
         unit: unit of all dimensions, such as "m"; "" for none.
 
     Raises:
-        ValueError: corners of different shapes, not finite or not in order, or a wrong number of names.
+        ValueError: the corners differ in shape, are not finite or not in order, or the number of names is wrong.
     """
 
     low: Array

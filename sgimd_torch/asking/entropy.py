@@ -1,8 +1,8 @@
 """Rival by entropy: it asks when a demonstration is expected to reduce entropy more than the learner's own movement.
 
 After Kulak & Calinon (2023), "Combining social and intrinsically-motivated learning for multi-task robot skill
-acquisition". They compute the mean epistemic entropy of the policies for random goals, and how much each strategy is
-expected to reduce it. The learner asks for a demonstration of the goal with the greatest epistemic entropy.
+acquisition". They compute the mean epistemic entropy of the policies for random goals, and its expected reduction by
+each strategy. The learner asks for a demonstration of the goal with the greatest epistemic entropy.
     learner = sgim_im(environment, seed, correspondence=..., teachers={"ann": ann}, goals=EntropyGoals)
 Here a Gaussian process models the policy for a goal, so that reductions have a closed form. The outcome of a strategy
 at a goal is predicted from the nearest earlier attempt of the strategy.
@@ -97,7 +97,7 @@ class EntropyGoals(StrategicGoals):
         goals, last = (
             (point - self._box.low) / self._box.sides,
             self._scaled(self.memory.contexts, self.memory.outcomes),
-        )  # A request without a reply (gain -1) teaches nothing: its outcome counts as known.
+        )  # A request without a reply (gain -1) teaches nothing, like an attempt whose outcome was known before.
         missed = np.full(len(point), np.nan) if gain == -1.0 else last[-1] - goals
         self._tried.setdefault(strategy, []).append((goals, missed))
 

@@ -25,7 +25,7 @@ from sgimd_torch.spaces import Array
 
 AUTONOMOUS: Final = "autonomous"
 _FEWEST, _LAST = 4, 10  # least and greatest number of attempts that a measure of progress uses
-# Probability of drawing a goal that is uniform in T first, and then a strategy by its interest at this goal.
+# Probability that first a goal uniform in T is drawn, and then a strategy by its interest at this goal.
 _ANYWHERE: Final = 0.5
 _GREATEST: Final = 10  # number of pairs (region, strategy), those with the greatest interest, of which one is drawn
 _TEMPERATURE: Final = 0.03  # difference of progress for which interest is e times as large
@@ -70,7 +70,7 @@ class StrategicGoals(Goals):
 
 
 class StrategicInterest(StrategicGoals):
-    """Goals and strategies of most progress for their cost, for learners that ask teachers.
+    """Goals and strategies with the most progress for their cost, for learners that ask teachers.
 
     The interest of a pair (region, strategy) is e^(progress / temperature), divided by the cost of the strategy. If the
     progress exceeds that of the cheapest strategy in the region, the excess is divided by the cost first.

@@ -3,7 +3,7 @@
 SGIM-IM and SGIM-ACTS, Nguyen & Oudeyer (2012): "Interactive learning gives the tempo to an intrinsically motivated
 robot learner", and "Active choice of teachers, learning strategies and goals for a socially guided intrinsic motivation
 learner". An attempt chooses a strategy and a goal together. If the strategy is to ask, the attempt requests a
-demonstration of the goal. At its end the goal model is told the competence at the goal and at the shown outcome.
+demonstration of the goal. The goal model is then told the competence at the goal and at the demonstrated outcome.
     StrategicBabbling(problem, babbling, {"imitate left": Asking("left", Mimic(problem), cost=2.0)})
 """
 

@@ -14,7 +14,7 @@ import numpy as np
 from sgimd_torch.environments.protocol import BatchEnvironment, Environment, check_instance, check_robot
 from sgimd_torch.spaces import Array, Box, check_count, stream
 
-_FACTOR: Final = 10.0  # largest accepted ratio of announced and measured noise; a wrong unit gives a larger ratio
+_FACTOR: Final = 10.0  # largest accepted ratio between announced and measured noise; a wrong unit exceeds it
 Movements = Sequence[tuple[Array, Array]]
 
 

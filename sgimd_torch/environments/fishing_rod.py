@@ -98,7 +98,7 @@ class FishingRod:
             ``(2,)`` m, landing point of the float.
 
         Raises:
-            ValueError: another shape, or a value that is not finite or outside its box.
+            ValueError: an argument has another shape, is not finite, or lies outside its box.
             TypeError: ``rng`` is not a Generator.
             SimulationError: the simulation diverged; the message names theta.
         """
@@ -139,8 +139,7 @@ class FishingRod:
             ``(2,)`` m, landing point of the float.
 
         Raises:
-            ValueError: shapes that do not fit, values that are not finite, or times that do not increase from 0 or
-                exceed 60 s.
+            ValueError: shapes do not fit, values are not finite, or times do not increase from 0 or exceed 60 s.
             SimulationError: the simulation diverged.
         """
         times, trajectory = check_recording(times, trajectory, len(JOINTS), longest=LONGEST)

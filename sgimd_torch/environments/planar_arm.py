@@ -144,7 +144,7 @@ class PlanarArm:
         return 1 / len(angles) * np.array([np.cos(directions).sum(), np.sin(directions).sum()])
 
     def _radius(self, bend: float) -> float:
-        """Distance (m) of the end from the base if all joints but the first are at ``bend`` (rad), from 1 down to 0."""
+        """Distance (m) of the end from the base if all joints but the first are at ``bend`` (rad)."""
         n = self.policies.dim
         return float(1 / n * np.cos((np.arange(n) - (n - 1) / 2) * bend).sum())
 

@@ -34,7 +34,7 @@ class Environment(Protocol):
 
     @property
     def outcomes(self) -> Box:
-        """T, the space of goals. Outcomes may lie outside it."""
+        """T, the space of goals. Outcomes may lie outside T."""
         ...
 
     @property
@@ -44,7 +44,7 @@ class Environment(Protocol):
 
     @property
     def outcome_noise(self) -> float:
-        """Standard deviation of each outcome dimension, in the unit of T, if a typical movement is repeated."""
+        """Standard deviation of each outcome dimension (in the unit of T) if a typical movement is repeated; may be 0."""
         ...
 
     def observe(self, rng: np.random.Generator) -> Array:
@@ -164,7 +164,7 @@ FAILURES: Final = 10
 
 
 class SimulationError(RuntimeError):
-    """A movement failed, so it has no usable outcome; with a ``theta`` ``(theta_dim,)`` the message names it."""
+    """A movement failed and has no usable outcome; if ``theta`` ``(theta_dim,)`` is given, the message names it."""
 
     def __init__(self, reason: str, theta: Array | None = None) -> None:
         super().__init__(reason, theta)  # pickle needs both arguments to send the exception to another process
@@ -193,7 +193,7 @@ def execute_many(
             outcomes.
         SimulationError: a movement has no finite outcome.
     """
-    # Copies, so that an environment may write into them.
+    # Copies, because an environment may change its arguments.
     contexts = environment.contexts.check("contexts", contexts).copy()
     thetas = environment.policies.check("thetas", thetas, "were goals passed instead?").copy()
     if not contexts.ndim == thetas.ndim == 2 or not len(contexts) == len(thetas) == len(rngs):
@@ -283,7 +283,7 @@ def check_recording(
 
 
 def check_instance(environment: object) -> None:
-    """Refuse an object that is no environment, for example the class itself.
+    """Refuse an object that is no environment, for example a class instead of an instance.
 
     Raises:
         ValueError: ``environment`` is a class, or lacks a member.

@@ -39,7 +39,7 @@ class RodTrace:
         let_out: time (s) when the line was let out; None if the float met the water before.
         step: time between two states (s).
         states: ``(n_steps, n_state)``, MuJoCo's full physics states, up to the first one at or after ``landed``.
-        floats: ``(n_steps, 6)``, position (m) and velocity (m/s) of the float in ``states``, as if always on its line.
+        floats: ``(n_steps, 6)``, position (m) and velocity (m/s) of the float in ``states``, always on its line.
         push: acceleration (m/s^2) along x that the wind gives to a freely flying float.
         gravity: downward acceleration (m/s^2) of a freely flying float.
     """
@@ -87,7 +87,7 @@ class Caster:
         self._pools: dict[int, tuple[rollout.Rollout, list[mujoco.MjData]]] = {}
         self._rooms: dict[str, Array] = {}
         self.home, self.hanging = self._settle(posture)
-        """Start configuration, a full physics state; position (m) and velocity (m/s) of the float in it, ``(6,)``."""
+        """Start configuration (a full physics state), and position (m) and velocity (m/s) ``(6,)`` of its float."""
 
     def cast(self, commands: list[Array], ends: Array, winds: Array) -> tuple[Array, np.ndarray]:
         """Simulate movements in parallel; the outcome of each is the same, bit for bit, as if simulated alone.
@@ -140,7 +140,7 @@ class Caster:
         return RodTrace(outcome, landed, let_out, self.timestep, *kept, push, self._gravity)
 
     def _settle(self, posture: Array) -> tuple[Array, Array]:
-        """``home``, c_org with the arm in ``posture`` and the line hanging still; ``hanging``, the float's state."""
+        """Start configuration c_org, with the arm in ``posture`` and the line hanging still, and state of its float."""
         data = mujoco.MjData(self.model)
         data.qpos[:6] = posture
         data.qpos[6] = -(posture[1] + posture[2] + posture[4])  # opposite to the rod's pitch, so the line hangs plumb
@@ -187,7 +187,7 @@ class Caster:
         n, n_steps = controls.shape[:2]
         run = self._room("run", n, n_steps, states.shape[1])
         seen = self._room("seen", n, n_steps, self.model.nsensordata)
-        # MuJoCo's own checks and copies would take as long as four steps; the shapes are right by construction.
+        # MuJoCo's own checks and copies would take as long as four time steps; the shapes are right by construction.
         pool.rollout(
             [self.model] * n, data, states, controls, state=run, sensordata=seen, nstep=n_steps, skip_checks=True
         )

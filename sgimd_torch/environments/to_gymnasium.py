@@ -80,7 +80,7 @@ class ToGymnasium(gymnasium.Env[Any, Any]):
         return observation, -distance, True, False, info
 
     def compute_reward(self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: Any = None) -> Array:
-        """Minus the distances ``(...)`` between goals ``(..., outcome_dim)``, for hindsight relabelling."""
+        """Minus the distances ``(...)`` between the two goals ``(..., outcome_dim)``, for hindsight relabelling."""
         return -np.linalg.norm(np.subtract(achieved_goal, desired_goal), axis=-1)
 
     def _observation(self, outcome: Array) -> Observation:

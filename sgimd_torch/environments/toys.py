@@ -29,7 +29,7 @@ class Toy:
 
     Args:
         contexts, policies, outcomes: C, Pi and T.
-        effect: (contexts ``(..., context_dim)``, thetas ``(..., theta_dim)``) -> outcomes without noise.
+        effect: function (contexts ``(..., context_dim)``, thetas ``(..., theta_dim)``) -> outcomes without noise.
         still: ``(theta_dim,)``, movement whose outcome in the middle of C is ``rest``.
         outcome_noise: standard deviation of the noise on each dimension of the outcome, in the unit of T.
     """
@@ -106,8 +106,7 @@ def two_elbows(*, noise: float = 0.01) -> Toy:
     """A planar arm of three links whose elbow bends to either side by 30 degrees or more: two families of postures.
 
     theta: shoulder, elbow and wrist; below .5 the elbow bends to the right, above .5 to the left. Each family reaches
-    nearly every place, but the mean of two postures of different families lands elsewhere. Outcome: place of the hand
-    (m).
+    nearly every place, but the mean of two postures from both families lands elsewhere. Outcome: the hand's place (m).
     """
     lengths = np.array([0.5, 0.4, 0.1])
 
@@ -126,8 +125,7 @@ def two_elbows(*, noise: float = 0.01) -> Toy:
 def spatial_arm(*, noise: float = 1.0) -> Toy:
     """An arm that turns about the vertical and bends in five joints, with links of 20 cm.
 
-    theta: the turn, within +-150 degrees, and five bends, within +-60 degrees. Outcome: place of the hand (cm) in three
-    dimensions.
+    theta: the turn, within +-150 degrees, and five bends, within +-60 degrees. Outcome: x, y and height of the hand (cm).
     """
 
     def hand(context: Array, theta: Array) -> Array:

@@ -19,7 +19,7 @@ _FIRST, _GROWTH = 16, 1.5  # number of exemplars at the first search for a plate
 _GUESSES: Final = 50  # number of candidate maps, each through the least number of exemplars that determine a map
 _GUESSED_ON: Final = 300  # largest number of random exemplars on which the candidates are compared
 _REFINED: Final = 5  # number of least squares fits that refine the best map
-_NEAR, _WITHIN = 2.0, 4.0  # distances from a plateau, in sd of the noise, within which nearly all or all its points lie
+_NEAR, _WITHIN = 2.0, 4.0  # sd from a plateau: nearly all of its points lie within the first, all within the second
 _ROUNDING: Final = 1e-9  # assumed noise if an environment has none, relative to the spread of outcomes
 _LEAST, _SHARE = 16, 0.1  # least number of exemplars on a plateau, and least share of all exemplars
 # Of the points within 4 sd of a plateau, at least this share must lie within 2 sd. Without a plateau, about half do.

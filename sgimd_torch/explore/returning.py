@@ -17,7 +17,7 @@ from sgimd_torch.parts import Explore, Inverse, Problem
 from sgimd_torch.spaces import Array
 
 _ENOUGH: Final = 16  # least number of exemplars with an effect from which an inverse model can learn
-_SHARE: Final = 0.1  # probability of a global movement after that; with more of them the inverse model is less accurate
+_SHARE: Final = 0.1  # probability of a global movement once there are enough; more make the inverse model less accurate
 _ANYWHERE: Final = 0.5  # share of the global movements that are uniform in Pi, to find other effects
 _NEAREST: Final = 10  # number of movements with an effect, in the most similar contexts, of which one is varied
 

@@ -43,7 +43,7 @@ class Widening(Explore):
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)
         self.width = problem.shared(Width, Width)
-        self._expected: tuple[int, Array] | None = None  # row and expected outcome of the last movement
+        self._expected: tuple[int, Array] | None = None  # row and expected outcome of the last global movement
         inverse = type(problem.inverse)
         if inverse.predict is Inverse.predict:
             problem.remarks.append(f"exploration does not widen: {inverse.__name__} predicts nothing")

@@ -15,7 +15,7 @@ import torch
 from sgimd_torch.forward_model.model import ForwardModel
 from sgimd_torch.spaces import Array, Box
 
-# All numbers are without a unit: lengths come from the data, so the unit of T does not matter.
+# All numbers are relative to Pi or to the spread of outcomes, so the unit of T does not matter.
 _REACH: Final = 0.08  # length scale of the process, relative to the sides of Pi times the square root of theta_dim
 # Weight of the variances that the model predicts, of noise and of disagreement between members. A network that has not
 # learnt enough takes its own errors for noise: late in a run on the rod it predicts twice the true standard deviation,

@@ -71,7 +71,7 @@ class ModelListener(Listener):
             say(f"{NOT_ASKED}: {why}")
 
     def curves(self) -> dict[str, float]:
-        """Numbers of the last refresh by tag; each refresh is given once."""
+        """Numbers of the last refresh by tag of the board; empty if they were read before."""
         curves, self._curves = self._curves, {}
         return curves
 

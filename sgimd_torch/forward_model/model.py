@@ -1,6 +1,6 @@
 """Forward model L, which predicts the outcome of a movement: an ensemble of networks, trained while the robot learns.
 
-Not in Nguyen & Oudeyer (2014), who use local models only. `OnlineTrainer` trains it.
+Not in Nguyen & Oudeyer (2014), who use local models only. `OnlineTrainer` trains the networks.
     model = ForwardModel(0, 25, 2, seed=3); model.refresh(memory); model.predict(contexts, thetas).mean
 """
 
@@ -34,8 +34,8 @@ class Prediction(NamedTuple):
 
     Attributes:
         mean: expected outcomes.
-        epistemic: standard deviation between the members; more data would reduce it.
-        aleatoric: standard deviation of the noise that the members predict; more data would not reduce it.
+        epistemic: standard deviation of the members' expected outcomes; more exemplars would reduce it.
+        aleatoric: standard deviation of the noise that the members predict; more exemplars would not reduce it.
     """
 
     mean: Array
@@ -181,8 +181,8 @@ class ForwardModel(Ensemble):
         outcomes are equal.
 
         Training ends early when predictions for the held-out exemplars (one in ten, never trained on) stop improving.
-        The earlier weights are restored if the loss is not finite, if the relative error exceeds 2 and twice its
-        earlier value, or if training is interrupted.
+        The earlier weights are restored if the loss is not finite, if the relative error exceeds both 2 and twice
+        its earlier value, or if training is interrupted.
 
         Args:
             memory: memory of the learner; it is only read.

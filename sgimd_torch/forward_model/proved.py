@@ -2,8 +2,8 @@
 
 Our addition, not in the paper. Before the model learns from new movements, model and process both predict their
 outcomes from the earlier movements (prequential analysis: Dawid, J. R. Stat. Soc. A 147, 1984). They are compared on
-those movements for which the process predicted the least variance, because answers are such movements. The test needs
-no movements of its own, and neither of the two chooses them.
+those movements for which the process predicted the least variance, because answers are such movements. So neither of
+the two is tested on its own answers, and no movements are executed for the test.
     inverse = ProvedModel(problem); inverse.trusted
 """
 
@@ -25,7 +25,7 @@ from sgimd_torch.spaces import Array, Estimate
 _FEWEST: Final = 200  # least number of recent movements for a test
 _SUREST: Final = 10  # one in ten recent movements is compared, those with the least variance by the process
 # Largest accepted ratio of the errors of model and process, measured on five tasks. With noise, a model with errors a
-# tenth larger answers as well, because lucky outcomes mislead the process. Without noise the ratio is inverted.
+# tenth larger answers as well, because lucky outcomes mislead the process. Without noise it is 1 / 1.1.
 _NEARLY: Final = 1.1
 _TINY: Final = np.finfo(float).tiny
 _MOST: Final = 10.0  # largest ratio of errors; ratios are clipped to [1/10, 10]
@@ -76,7 +76,7 @@ class ProvedModel(ThroughModel):
         return self.through_model if self.trusted else self.process
 
     def _test(self, memory: Memory, learnt: int) -> None:
-        """Test model and process on the movements after the first ``learnt`` ones, which both have learnt from."""
+        """Test model and process, which know the first ``learnt`` movements, on the later movements."""
         for row in range(len(self._told), learnt):
             self._told.add(memory.contexts[row], memory.thetas[row], memory.outcomes[row])
         process, through_model = self._rivals

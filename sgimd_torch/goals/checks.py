@@ -29,7 +29,7 @@ def check_attempt(problem: Problem, context: ArrayLike, goal: ArrayLike, compete
 
     Raises:
         ValueError: ``context`` is not one point of C, ``goal`` is not one point of T, ``competence`` is not in [-1, 0],
-            or ``gain`` is not in [-1, 1]. Check a demonstrated outcome by ``outcomes.contains`` before.
+            or ``gain`` is not in [-1, 1]. Check a demonstrated outcome by ``outcomes.contains`` first.
     """
     point = check_in(problem.contexts, "context", context)
     goal = check_in(problem.outcomes, "goal", goal, "is it a demonstrated outcome? Check it by outcomes.contains first")

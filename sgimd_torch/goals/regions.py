@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from sgimd_torch.spaces import Array
 
 Progress = Callable[[Array, Array, Array], float]
-"""Function (points, competences, gains) of n >= 4 goals, oldest first -> progress. Points ``(n, dim)`` are contexts and
-goals in C x T. Competences ``(n,)`` and gains ``(n,)`` are arguments of `Goals.add`, one for each goal."""
+"""Function (points, competences, gains) of n >= 4 goals, oldest first -> progress. Points ``(n, dim)`` of C x T are
+contexts and goals. Competences ``(n,)`` and gains ``(n,)`` are arguments of `Goals.add`, one for each goal."""
 
 
 def gained_progress(points: Array, competences: Array, gains: Array) -> float:
-    """Mean over goals of the rise of the competence at the goal during its attempt.
+    """Mean rise of the competence at a goal during the attempt at this goal.
 
     Deviation: eq. (3) compares competences at older goals with competences at newer goals. If only some goals of a
     region can be reached, as in most regions of a large task space, differences between goals hide progress.
@@ -139,7 +139,7 @@ class Region:
         )
 
     def split(self, axis: int, cut: float) -> tuple[Region, Region]:
-        """The halves below and above a cut; goals on the cut belong above."""
+        """The halves below and above a cut; goals on the cut belong to the upper half."""
         is_below = self.points[:, axis] < cut
         low, high = self.low.copy(), self.high.copy()
         low[axis] = high[axis] = cut

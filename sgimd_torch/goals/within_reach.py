@@ -21,11 +21,11 @@ from sgimd_torch.spaces import Array
 _FIRST: Final = 21  # least number of exemplars that determine a box; with fewer, goals are uniform in T
 _LOOKED_AT, _GROWTH = 1000, 1.05  # largest number of such exemplars; growth of the memory from one box to the next
 _ALIKE: Final = 5  # number of similar movements whose mean outcome counts; fewer while the memory is small
-_TAIL: Final = 0.02  # share of these means that is left out at each end of a dimension
+_TAIL: Final = 0.02  # share of the mean outcomes that is left out at each end of a dimension
 _NARROWEST, _WIDEST = 0.02, 0.2  # bounds of the step, relative to the box's longest side; at first the step is wider
 _WIDE_FOR: Final = 250  # number of exemplars up to which the step stays wide
 _FACTOR: Final = 1.4  # factor of the step after a met goal outside the box; after a missed goal 1.4^(-1/3)
-_MEDIAN: Final = 1.1  # factor by which the running median of errors rises after a larger error, or falls
+_MEDIAN: Final = 1.1  # factor by which the running median rises after a larger error, and falls after a smaller one
 _ROUNDING: Final = 1e-9  # largest spread of outcomes that counts as none, relative to the longest side of T
 _MOST: Final = 0.7  # geometric mean of the box's sides, relative to T's, from which on goals are uniform in T
 

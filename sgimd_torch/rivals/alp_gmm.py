@@ -2,7 +2,7 @@
 
 Portelas, Colas, Hofmann & Oudeyer, Teacher algorithms for curriculum learning of deep RL in continuously parameterized
 environments (CoRL 2019). Progress at a goal is |competence - competence at the nearest earlier goal|. A mixture of
-Gaussians over (context, goal, progress) is fitted every 50 goals, and shows where progress is high. It needs
+Gaussians over (context, goal, progress) is fitted every 50 goals, and shows where progress is high. This module needs
 scikit-learn.    goals = AlpGmm(problem)
 """
 

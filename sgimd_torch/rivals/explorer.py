@@ -24,7 +24,7 @@ class QualityDiversity(Strategy):
     a movement from the middle of Pi, relative to the sides of Pi. An outcome outside T counts in the nearest border
     cell of T. If T is far larger than the reachable part, most outcomes fall into a few cells, so there are few elites.
 
-    Each attempt is one movement. If an attempt is interrupted before its outcome, the next one repeats the movement.
+    Each attempt is one movement. If an attempt is interrupted before its outcome, the next attempt repeats it.
 
     Args:
         problem: problem to learn; exemplars of its memory are in the archive from the start.

@@ -58,7 +58,7 @@ def quality_diversity(
     Args:
         environment: robot and world; nothing is executed here.
         seed: number from which the random stream of the learner comes.
-        origin: name of this stream, and origin of the movements in the record.
+        origin: name of the random stream, and origin of the movements in the record.
         emitters: function (archive, rng) -> emitters, which propose movements.
         annealed: keywords of the archive of CMA-MAE.
         cells: number of cells in each dimension of T; None: about 400 cells in all.
@@ -103,7 +103,7 @@ def map_elites(
     batch: int = 10,
     **options: Any,
 ) -> Learner:
-    """MAP-Elites with a teacher: Gaussian variations of elites, drawn evenly from the reached cells of T.
+    """MAP-Elites with a teacher: Gaussian variations of elites; all reached cells of T are equally likely.
 
     Args:
         environment: robot and world; nothing is executed here.
@@ -193,7 +193,7 @@ def cma_mae(
     learning_rate: float = 0.01,
     **options: Any,
 ) -> Learner:
-    """CMA-MAE with a teacher: CMA-ME with thresholds that rise slowly, so that a cell can be improved for long.
+    """CMA-MAE with a teacher: CMA-ME with thresholds that rise slowly, so that more movements are improvements.
 
     Args:
         environment, seed, emitters, sd, batch, options: arguments of `cma_me`.
