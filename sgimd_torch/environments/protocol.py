@@ -44,7 +44,7 @@ class Environment(Protocol):
 
     @property
     def outcome_noise(self) -> float:
-        """Standard deviation of each outcome dimension (in the unit of T) if a typical movement is repeated; may be 0."""
+        """Standard deviation of each outcome dimension (in the unit of T) if a typical movement is repeated, or 0."""
         ...
 
     def observe(self, rng: np.random.Generator) -> Array:

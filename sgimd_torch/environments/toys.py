@@ -125,7 +125,7 @@ def two_elbows(*, noise: float = 0.01) -> Toy:
 def spatial_arm(*, noise: float = 1.0) -> Toy:
     """An arm that turns about the vertical and bends in five joints, with links of 20 cm.
 
-    theta: the turn, within +-150 degrees, and five bends, within +-60 degrees. Outcome: x, y and height of the hand (cm).
+    theta: the turn, within +-150 degrees, and five bends, within +-60 degrees. Outcome: the hand's x, y, height (cm).
     """
 
     def hand(context: Array, theta: Array) -> Array:
