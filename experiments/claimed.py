@@ -1,4 +1,4 @@
-"""The claims of each page of results, each with its bar: first the paper's, then ours.
+"""The claims of each page of results, each with its bar: first the claims of the paper, then ours.
 
 for verdict in judge(paper(found, letter=True)): print(verdict.claim, verdict.verdict)
 """
@@ -23,20 +23,21 @@ EVERY, COST = 30, 10  # movements between two demonstrations of SGIM-D; cost of 
 
 
 def less(found: Evidence, ours: str, theirs: str, *times: int, name: str = "") -> list[Part]:
-    """A part for each time, which says that our error is smaller than theirs."""
+    """Parts of a claim, one for each number of movements in ``times``: our error is smaller than theirs."""
     names = {at: f"{name} at {at}".strip() if len(times) > 1 else name for at in times or (LAST,)}
     return [at_most(0.0, found.difference, ours, theirs, at, name=each, form="+.4f") for at, each in names.items()]
 
 
 def times_as_much(found: Evidence, bar: float, ours: str, theirs: str, *times: int) -> list[Part]:
-    """A part for each time, which says that our error is at most ``bar`` times theirs."""
+    """Parts of a claim, one for each number of movements in ``times``: our error is at most ``bar`` times theirs."""
     return [at_most(bar, found.ratio, ours, theirs, at, name=f"at {at}") for at in times]
 
 
 def paper(found: Evidence, *, letter: bool) -> list[Claim]:
-    """Claims of section 6 of the paper, on learners to the ``letter``, for which eq. (9) answers, or on our learners.
+    """Claims of section 6 of the paper, on learners by the ``letter`` of the paper, or else on our learners.
 
-    If a claim says nothing else, it is about 5000 movements with a demonstration of demonstrator 3 every 30 movements.
+    For learners by the letter, eq. (9) answers. Unless a claim says otherwise, it is about 5000 movements, with a
+    demonstration of demonstrator 3 every 30 movements.
     """
 
     def our(algorithm: str, where: str = "") -> str:
@@ -167,7 +168,7 @@ def learning(found: Evidence) -> list[Claim]:
 
 
 def answers(found: Evidence) -> list[Claim]:
-    """Claims on inverse models, for memories of 250 to 2000 movements on the suite and of SUITED on the rod."""
+    """Claims on inverse models, which answer from the memories of all learners of the suite on all its tasks."""
     memories = [*EXPERIMENTS["suite"], *(f"{name}.rod" for name in SUITED)]
 
     def proved(other: str) -> list[Part]:
@@ -185,7 +186,7 @@ def answers(found: Evidence) -> list[Claim]:
 
 
 def curiosity(found: Evidence) -> list[Claim]:
-    """Claims on the gain from choosing goals, and on the gain from choosing goals by interest."""
+    """Claims on what choosing goals gains over choosing movements, and what interest gains over uniform goals."""
     return [
         Claim("Goals in the place of movements: SAGG-RIAC − Random < 0",
               less(found, "sagg-riac.rod", "random-nearest.rod")),
@@ -203,7 +204,7 @@ def curiosity(found: Evidence) -> list[Claim]:
 
 
 def model(found: Evidence) -> list[Claim]:
-    """Claims on SGIM-D with a forward model instead of `process`: one that proves itself first, one always asked."""
+    """Claims on SGIM-D with a forward model instead of `process`: one has to prove itself first, one always answers."""
     proved, always, plain = "sgim-d-model.rod by model", "gradient by model-alone", "sgim-d"
     on_arms = [
         at_most(1.03, found.ratio, f"sgim-d-model.{arm} by model", f"sgim-d{arm.removeprefix('planar')}", at,
@@ -229,7 +230,7 @@ def model(found: Evidence) -> list[Claim]:
 
 
 def asking(found: Evidence) -> list[Claim]:
-    """Claims on learners that ask: when, how much, whom, where and at which cost they ask."""
+    """Claims on learners that ask: when, how often, whom and where they ask, and at which cost."""
     im, dear, sgim_d, toss = "sgim-im", "sgim-im-cost-10", "taught-every-30", "sgim-im-toss"
 
     def asked(name: str, what: str, teachers: Sequence[str] = ()) -> pd.Series:
@@ -242,7 +243,7 @@ def asking(found: Evidence) -> list[Claim]:
         return found.less(asked(name, what), asked(other, than), level=level)
 
     def at_equal_cost(*, level: Level = LEVEL) -> Interval:
-        """Our error minus that of SGIM-D at equal cost, on straight lines between the evaluations of SGIM-D."""
+        """Our error minus that of SGIM-D at equal cost; errors of SGIM-D are interpolated between its evaluations."""
         ours, shown = shared(found.at(dear), asked(dear, "shown"))
         costs = (LAST + COST * shown) / (1 + COST / EVERY)
         curve = found.curve(sgim_d)
