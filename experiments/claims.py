@@ -1,8 +1,8 @@
 """Make the pages in results/ and the README's section of results from templates and from the tables of results.
 
-The text of each page is a template in experiments/pages/. Change the template, not the page. The tables, results.csv
-and smaller ones, are those that compare.py writes to --results. Intervals are bootstrapped with a fixed seed, so equal
-tables give equal pages. The script lists runs that the tables lack.
+The text of each page is a template in experiments/pages/. Change the template, not the page. --results has the tables
+that compare.py writes, results.csv and smaller ones. Intervals are bootstrapped with a fixed seed, so equal tables give
+equal pages. The script lists runs that the tables lack.
 
 Examples:
   python experiments/claims.py                                  all pages, and the README

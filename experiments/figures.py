@@ -5,7 +5,7 @@
   gain        error after each step from random movements to practice               (GAIN)
   curiosity   error with goals by interest, divided by the error with uniform goals (CURIOSITY)
 
-Lines are interquartile means over seeds; bands and bars are 95 % intervals. Figures without data are named, not drawn.
+Points are interquartile means over seeds, with 95 % intervals. If a figure has no data, a message says so.
 
 Example:
   python experiments/figures.py

@@ -1,9 +1,9 @@
-"""Verdicts on claims: a claim has parts, and each part is a number with a bar. A page corrects for all its claims.
+"""Verdicts on claims: a claim has parts, and each part is a number with a bar, the bound that the number must keep.
 
     judge([Claim("SGIM-D halves Random's error", [at_most(0.5, found.ratio, "sgim-d", "random")])])
 A part holds if its whole interval is on the right side of the bar. A claim holds if all its parts hold; this needs no
 correction for their number. A claim fails if one part fails at a level corrected for the number of parts. All other
-claims are open.
+claims are open. Verdicts on several claims, such as all claims of a page, are corrected jointly.
 """
 
 from __future__ import annotations

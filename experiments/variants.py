@@ -24,8 +24,8 @@ ARMS: Final = ("planar-arm-7", "planar-arm-50")
 SWIMMERS: Final = ("random", "sagg-riac", "sgim-d")
 SGIM_D: Final[Variant] = {"algorithm": "sgim-d"}
 SAGG_RIAC: Final[Variant] = {"algorithm": "sagg-riac"}
-# The algorithm practice with uniform goals and without a search for effects. On the rod, its taught variant learns
-# exactly as the default `practice-taught`.
+# The algorithm practice with uniform goals and without a search for effects. Taught on the rod, a learner with these
+# options makes the same movements as the default `practice-taught`.
 UNIFORM_PRACTICE: Final[Variant] = {
     "algorithm": "practice",
     "goals": "uniform",

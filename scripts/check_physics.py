@@ -111,11 +111,11 @@ def main() -> int:
     off = float(np.linalg.norm(natural - [0.0, 0.5]))
     rows = [
         (f"{diverged} of {movements} uniform random movements diverged", "0", diverged == 0),
-        (f"{diverged_corners} of {movements // 10} on random corners of the box diverged", "0", diverged_corners == 0),
-        (f"a step of sd .005 moves the landing by {smoothness:.4f} m (median)", "<= .03", smoothness <= 0.03),
-        (f"noise sd {sd:.4f} m a dimension (mean)", ".03 to .075", 0.03 <= sd <= 0.075),
-        (f"outcome_noise promises {rod.outcome_noise:.4f} m", "within 10 %", abs(rod.outcome_noise / sd - 1) <= 0.1),
-        (f"noisiest tenth scatters {spread:.1f} times the quietest", ">= 5", spread >= 5),
+        (f"{diverged_corners} of {movements // 10} at random corners of Pi diverged", "0", diverged_corners == 0),
+        (f"a change of theta, sd .005, moves landings by {smoothness:.4f} m (median)", "<= .03", smoothness <= 0.03),
+        (f"landings scatter with sd {sd:.4f} m (mean)", ".03 to .075", 0.03 <= sd <= 0.075),
+        (f"outcome_noise is {rod.outcome_noise:.4f} m", "within 10 %", abs(rod.outcome_noise / sd - 1) <= 0.1),
+        (f"the noisiest tenth scatters {spread:.1f} times as much as the least noisy", ">= 5", spread >= 5),
         (f"kurtosis of the pooled noise {kurtosis:.1f}", "> 4, a Gaussian has 3", kurtosis > 4),
         (f"densest tile at ({natural[0]:.2f}, {natural[1]:.2f}), {off:.2f} m from (0, .5)", "<= .25", off <= 0.25),
         (f"{100 * rare:.0f} % of benchmark tiles get < .1 % of random movements", ">= 33 %", rare >= 1 / 3),

@@ -2,9 +2,8 @@
 
 The paper's demonstrator 3 was a person who led the arm by hand. These recordings are *simulated*, with the properties
 that the paper describes: every joint moves monotonically from the start to an end posture, and all joints follow one
-scaled curve. The function ``end_posture`` gives the end postures, with random deviations, as of a hand. Recordings are
-chosen so that outcomes spread evenly over the plane. The speed varies smoothly, so no recording is exactly a motor
-primitive.
+scaled curve. ``end_posture`` gives the end postures, to which random deviations are added. Recordings are chosen so
+that outcomes spread evenly over the plane. The speed varies smoothly, so no recording is exactly a motor primitive.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 Section 5.3 of the paper. The script runs several SAGG-RIAC learners on the fishing rod and puts their memories
 together. Demonstrator 1 is naive: it shows random exemplars. Demonstrator 2 is careful: it chooses tiles of T that
-spread evenly, and executes the exemplars of each tile several times. Then it shows the exemplar of the tile whose
-landings vary least. Recordings are joint trajectories, as for demonstrator 3, so the learner has to find theta_d.
+spread evenly, and executes the exemplars of each tile several times. On each tile it shows the exemplar with the least
+scatter of landings. Recordings are joint trajectories, as for demonstrator 3, so the learner has to find theta_d.
 """
 
 from __future__ import annotations

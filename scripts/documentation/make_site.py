@@ -65,7 +65,7 @@ def names() -> str:
 
 
 def build(site: Path) -> int:
-    """Make the site, in place of an earlier one. The exit code is not 0 if a page has a fault, such as a broken link."""
+    """Make the site, in place of an earlier one; the exit code is not 0 if a page has a fault."""
     with TemporaryDirectory() as folder:
         shutil.copytree(HERE, folder, dirs_exist_ok=True)
         Path(folder, "sgimd_torch").symlink_to(ROOT / "sgimd_torch")

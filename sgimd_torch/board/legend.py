@@ -10,11 +10,11 @@ LEGEND: Final[Mapping[str, str]] = {
     "error/mean": "Mean distance UNIT, over the benchmark goals, from a goal to the outcome of the movement for it, "
     "eq. (10).",
     "error/median": "Median distance UNIT from a benchmark goal to the outcome of the movement for it.",
-    "error/p90": "90th percentile of the distances UNIT from the benchmark goals to their outcomes.",
-    "error/failed": "Movements of the evaluation that failed. The error is then the distance from goal to rest.",
+    "error/p90": "90th percentile of the distance UNIT from a benchmark goal to the outcome of the movement for it.",
+    "error/failed": "Number of movements of the evaluation that failed. A failed movement counts as rest.",
     "error/noise_floor": "Part UNIT of error/mean that motor noise alone makes.",
-    "error": "Mean error UNIT if another inverse model answers. All runs have by_linear, so this curve compares "
-    "learners without the influence of their own inverse models.",
+    "error": "Mean error UNIT with the inverse model that the tag names, in place of the learner's own. All runs have "
+    "error/by_linear, which compares what the learners remember, whatever their inverse models are.",
     "met": "Share of the benchmark goals of a place whose error is at most half the side of a benchmark tile.",
     "competence": "Mean competence of the goals that a region remembers: 0 is a goal that is met, -1 an outcome no "
     "better than rest. R is all of C x T, R0 and R1 are its two parts, R01 is a part of R0; map/competence shows the "
@@ -32,7 +32,7 @@ LEGEND: Final[Mapping[str, str]] = {
     "last point.",
     "strategy": "Share of the movements since the last point before which the learner asked by this strategy.",
     "model/relative_error": "Prediction error for exemplars that training left out, divided by the error of predicting "
-    "their mean outcome. A model without use has 1.",
+    "their mean outcome. A useless model has 1.",
     "model/held_out": "Negative log likelihood of exemplars that training left out; lower is better.",
     "model/steps": "Steps of the optimiser at the last refresh.",
     "model/error": "Mean distance UNIT from the newest outcomes to their predictions before training on them.",

@@ -32,8 +32,8 @@ class InUseError(RunError):
     """Another process is writing the record."""
 
 
-_COUNTED: Final = (Kind.MOVED, Kind.RESTED, Kind.FAILED)
-_IN_CONTEXT: Final = (*_COUNTED, Kind.ASKED, Kind.INTERRUPTED)
+_COUNTED: Final = (Kind.MOVED, Kind.RESTED, Kind.FAILED)  # events that count as movements
+_IN_CONTEXT: Final = (*_COUNTED, Kind.ASKED, Kind.INTERRUPTED)  # events with a context
 
 
 def layout(dims: Dims) -> dict[str, list[str]]:
@@ -64,7 +64,7 @@ def layout(dims: Dims) -> dict[str, list[str]]:
 
 
 def event_row(event: Event, movement: int, lesson: int | None, dims: Dims) -> Row:
-    """The row of an event after ``movement`` movements; ``lesson`` is the row of its demonstration in its table."""
+    """The row of an event after ``movement`` movements; ``lesson`` is the row number of the event's demonstration."""
     c, p, t = dims
     vectors = (
         *_cells(event.context, c),

@@ -89,15 +89,15 @@ def breach(place: str, name: str) -> str | None:
         )
     target = rest[0] if rest and rest[0] in ROW else "__init__"
     if target == "__init__":
-        return None if rest[:1] == ["__version__"] or not rest else f"{place} imports {name} through the front door"
+        return None if rest[:1] == ["__version__"] or not rest else f"{place} imports {name} from the package"
     if target != room and ROW[target] >= ROW[room]:
         return f"{place} (row {ROW[room]}) imports {name} (row {ROW[target]})"
     if (room in LEARNING and target in WORLDS and not name.startswith(f"{PACKAGE}.{PROTOCOL}")) or (
         room in WORLDS and target in LEARNING
     ):
-        return f"{place} imports {name}: learning and environments meet in spaces and in the protocol"
+        return f"{place} imports {name}: learning and environments share only spaces and the protocol"
     if target in WORLDS and room not in WORLDS | FREE and not name.startswith(f"{PACKAGE}.{PROTOCOL}"):
-        return f"{place} imports {name}: of an environment only the protocol may be known here"
+        return f"{place} imports {name}: of environments, only the protocol may be imported here"
     return None
 
 
@@ -175,10 +175,10 @@ def test_there_are_few_rooms_and_no_folder_is_crowded():
 @pytest.mark.parametrize(
     ("place", "statement"),
     [
-        ("spaces", "from sgimd_torch.memory import Memory"),  # upwards
+        ("spaces", "from sgimd_torch.memory import Memory"),  # in a row below
         ("memory", "from sgimd_torch import learner"),
-        ("learner", "from sgimd_torch import Memory"),  # through the front door
-        ("strategies", "def late():\n    import sgimd_torch.session"),  # hidden in a function
+        ("learner", "from sgimd_torch import Memory"),  # from the package
+        ("strategies", "def late():\n    import sgimd_torch.session"),  # inside a function
         ("strategies", "from sgimd_torch.environments.planar_arm import PlanarArm"),
         ("environments/fishing_rod", "from sgimd_torch.memory import Memory"),
         ("session", "from sgimd_torch.environments.fishing_rod import FishingRod"),

@@ -16,15 +16,15 @@ from sgimd_torch.evaluation import SHIPPED as SHIPPED_BENCHMARK
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.spaces import Box, Demonstration
 
-LARGEST: Final = 1e6  # m, half side of T
+LARGEST: Final = 1e6  # m, largest half side of T
 
 
 @hands_on(FishingRod, "noise", "max_wind", "line")
 def fishing_rod(*, task_space: float = 1.0, threads: int = 1, **physics: Any) -> Task:
     """Arm with a fishing rod, in MuJoCo: the paper's task.
 
-    Demonstrations and benchmark goals are those of the paper's rod without wind, whatever the options are. If the rod
-    has contexts, they belong to the context 0.
+    Demonstrations and benchmark goals are those of the paper's rod without wind, whatever the options are. For a rod
+    with contexts, demonstrations and goals belong to the context 0.
 
     Args:
         task_space: half side (m) of T, a square; 100 in the paper's large-space experiment.
@@ -56,5 +56,5 @@ rod_long = partial(fishing_rod, line=1.5)
 
 
 def _in_context_zero(context_dim: int) -> list[Demonstration]:
-    """The shipped demonstrations, for a rod with contexts."""
+    """The shipped demonstrations, as demonstrations in the context 0 of a rod with contexts."""
     return [replace(shown, context=np.zeros(context_dim)) for shown in load_demonstrations()]

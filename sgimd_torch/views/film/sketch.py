@@ -1,7 +1,7 @@
 """Films of robots in the plane: chains of links from a ``Sketch``, drawn without OpenGL.
 
     write_film(Path("film.mp4"), shoot(Sketchbook(arm.outcomes, shots), shots))
-The goal is a ring, past outcomes are dots, and the outcome is a cross. A line is the path of the chain's end. The first
+The goal is a ring, past outcomes are dots, the outcome is a cross, and a line is the path of the chain's end. The first
 two dimensions of an outcome are x and y of the picture; if an outcome has only one dimension, y is 0.
 """
 
