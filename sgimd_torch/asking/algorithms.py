@@ -115,7 +115,7 @@ def sgim_im(
         environment: robot and world; nothing is executed here.
         seed: number from which all random streams of the learner come.
         correspondence: function from times and trajectory to theta_d, eq. (6).
-        teachers: mapping from one name to one teacher.
+        teachers: mapping from names to teachers, with one entry.
         options: options of `sgim_acts`.
 
     Raises:
@@ -131,4 +131,4 @@ sgim_acts_search = partial(sgim_acts, **SEARCHING)
 sgim_im_search = partial(sgim_im, **SEARCHING)
 """SGIM-IM, as published: a search at each goal instead of practice."""
 sgim_eer = partial(sgim_im, goals=EntropyGoals)
-"""SGIM-IM; asks when a demonstration is expected to reduce entropy more than a movement of its own."""
+"""SGIM-IM; asks when a demonstration should reduce entropy more than the learner's own movement."""

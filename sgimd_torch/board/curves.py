@@ -1,6 +1,6 @@
-"""The curves of a board: numbers with a tag each, computed from episodes, evaluations and regions.
+"""The curves of a board: numbers by tag, computed from episodes, evaluations and regions.
 
-Interest and competence by region are those of section 3.2.1 of Nguyen & Oudeyer (2014).
+Section 3.2.1 of Nguyen & Oudeyer (2014) defines interest and competence of a region.
     behaviour = Behaviour(0.02); behaviour.episode(episode); behaviour.curves(); of_regions(interest_map.regions)
 """
 
@@ -17,13 +17,13 @@ from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.goals.regions import Region
 from sgimd_torch.spaces import Array, Box, Episode
 
-DEPTH: Final = 3  # number of levels below the root of the tree of regions that have curves, so at most 15 curves
-PLACES: Final = 4  # largest number of places that have a curve; 2 x 2 in the plane
-_RECENT: Final = 50  # number of last goals that count
+DEPTH: Final = 3  # levels of the tree of regions, below its root, that have curves; so at most 15 regions have them
+PLACES: Final = 4  # largest number of places, cells of T, that have a curve; 2 x 2 in the plane
+_RECENT: Final = 50  # number of latest goals over which the curves of goals are computed
 
 
 class Behaviour:
-    """What the learner and its teachers do.
+    """Curves of what the learner and its teachers do.
 
     Args:
         tolerance: distance, in the unit of T, at which a goal counts as reached.
@@ -31,8 +31,8 @@ class Behaviour:
 
     def __init__(self, tolerance: float) -> None:
         self.tolerance = tolerance
-        self._since: Counter[str] = Counter()  # tag of a regime or strategy -> movements since the last point
-        self._imitated: list[float] = []  # distances of imitations since the last point
+        self._since: Counter[str] = Counter()  # number of movements since the last point, by tag
+        self._imitated: list[float] = []  # distances missed by imitations since the last point
         self._goal: Array | None = None
         self._missed_by: deque[float] = deque(maxlen=_RECENT)  # smallest distance for each goal
         self._demonstrations = self._answered = 0
@@ -59,10 +59,10 @@ class Behaviour:
             self._missed_by[-1] = min(distance, self._missed_by[-1])
 
     def curves(self) -> dict[str, float]:
-        """Shares and means since the last call, and counts since the first movement."""
+        """Values of the curves by tag: shares and means since the last call, counts since the first movement."""
         total = sum(n for tag, n in self._since.items() if tag.startswith("regime/"))
         values = {tag: n / total for tag, n in self._since.items()}
-        self._since = Counter(dict.fromkeys(self._since, 0))  # a regime that was seen once keeps its curve
+        self._since = Counter(dict.fromkeys(self._since, 0))  # known tags keep their curves, at 0
         values["teacher/demonstrations"] = self._demonstrations
         if any(tag.startswith("strategy/") for tag in values):
             values["teacher/replies"] = self._answered
@@ -77,11 +77,11 @@ class Behaviour:
 
 
 def of_evaluation(found: Evaluation, near: float, places: Mapping[str, NDArray[np.bool_]]) -> dict[str, float]:
-    """Errors of an evaluation, and the share of the goals that are met.
+    """Values of the curves of an evaluation by tag: errors, and the share of goals that are met in each place.
 
     Args:
-        found: errors for n goals.
-        near: distance, in the unit of T, at which a goal counts as met.
+        found: evaluation of n goals.
+        near: largest error, in the unit of T, at which a goal counts as met.
         places: mask ``(n,)`` of the goals that lie in each place, by the name of the place.
     """
     met = found.errors <= near
@@ -97,17 +97,17 @@ def of_evaluation(found: Evaluation, near: float, places: Mapping[str, NDArray[n
 
 
 def places_of(space: Box, goals: Array) -> dict[str, NDArray[np.bool_]]:
-    """Cells of equal size that divide the part of T where the goals of a benchmark lie, after rounding it outwards.
+    """Places of T: cells of equal size that together cover the goals of a benchmark.
 
-    So runs on one benchmark have the same places, however large their T is.
+    Every T that contains all goals has the same places, so runs with one benchmark can be compared.
 
     Args:
         space: T.
         goals: ``(n, outcome_dim)``, in T.
 
     Returns:
-        Mask ``(n,)`` of the goals in each cell, by the name of the cell, such as "x -1..0 y 0..1". Cells without goals
-        are left out; a T of three dimensions or more has no cells. Dimensions without names are called "t0", "t1", ...
+        Mask ``(n,)`` of the goals in each place, by the name of the place, such as "x -1..0 y 0..1". Places without
+        goals are left out; a T of more than two dimensions has no places. Unnamed dimensions are called "t0", "t1", ...
     """
     per_side = int(PLACES ** (1 / space.dim))
     if per_side == 1:
@@ -129,9 +129,9 @@ def places_of(space: Box, goals: Array) -> dict[str, NDArray[np.bool_]]:
 
 
 def of_regions(regions: Sequence[Region]) -> dict[str, float]:
-    """Mean competence and mean interest of each node of the tree of regions, over the goals that its regions remember.
+    """Mean competence and mean interest, by tag, of each node of the tree whose leaves are ``regions``.
 
-    The ``regions`` are the leaves of the tree. A node without goals has no curve.
+    The means are over the remembered goals of all leaves below the node. A node without goals has no curve.
     """
     values: dict[str, float] = {"regions/count": len(regions)} if regions else {}
     for path, leaves in branches(regions).items():
@@ -143,9 +143,9 @@ def of_regions(regions: Sequence[Region]) -> dict[str, float]:
 
 
 def branches(regions: Sequence[Region]) -> Mapping[str, list[Region]]:
-    """The leaves below each node of the tree of regions, down to level ``DEPTH``, by the node's path; paths are sorted.
+    """The leaves below each node of the tree of regions, by the path of the node; deepest nodes are at level ``DEPTH``.
 
-    The cells of a `ProgressGrid`, such as "R.3.7", lie below "R" alone.
+    The cells of a `ProgressGrid`, such as "R.3.7", form no tree: "R" is their only node.
     """
     found: dict[str, list[Region]] = {}
     for region in regions:

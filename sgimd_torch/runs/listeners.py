@@ -1,4 +1,4 @@
-"""Listeners, which are told the movements and evaluations of a run, and a clock for the parts of a run."""
+"""Listeners, which are told the movements and evaluations of a run, and a clock that times the parts of a run."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from sgimd_torch.spaces import Episode
 
 
 class Listener(Protocol):
-    """Listener of a run. A resumed run first tells its listeners everything that is in the record.
+    """Listener of a run; it overrides the methods that it needs.
 
-    A listener overrides the methods that it needs.
+    A resumed run first tells its listeners everything that is in the record.
     """
 
     def episode(self, episode: Episode, replayed: bool) -> None:
@@ -22,19 +22,19 @@ class Listener(Protocol):
         return
 
     def evaluated(self, movements: int, found: Mapping[str, Evaluation]) -> None:
-        """The learner was evaluated after this number of movements; ``found`` is by name of the inverse model."""
+        """The learner was evaluated after ``movements`` movements; ``found`` is by name of the inverse model."""
         return
 
     def begin(self) -> None:
-        """The replay is over: from now on files may change."""
+        """The replay of the record is over; before this call, a listener must not change files."""
         return
 
     def curves(self) -> Mapping[str, float]:
-        """Numbers for the board since the last call, by tag."""
+        """New numbers for the board since the last call, by tag."""
         return {}
 
     def flush(self) -> None:
-        """Write everything so far to the disk."""
+        """Write everything to the disk that is still in memory."""
         return
 
     def close(self) -> None:
@@ -43,7 +43,11 @@ class Listener(Protocol):
 
 
 class Seconds:
-    """Seconds spent so far, by part of the run. Physics and evaluation, which are not replayed, begin at ``before``."""
+    """Seconds spent so far, by part of the run.
+
+    Args:
+        before: seconds of the resumed run; physics and evaluation continue from there, as a replay skips both.
+    """
 
     def __init__(self, before: Mapping[str, float]) -> None:
         self._spent = {part: before.get(f"seconds_{part}", 0.0) for part in ("physics", "evaluation")} | {
@@ -52,7 +56,7 @@ class Seconds:
 
     @contextmanager
     def of(self, part: str) -> Iterator[None]:
-        """Times a block."""
+        """Add the time of a block to a ``part``."""
         begun = time.perf_counter()
         try:
             yield
@@ -60,7 +64,7 @@ class Seconds:
             self._spend(part, begun)
 
     def of_physics(self, execute: Callable[..., Any]) -> Callable[..., Any]:
-        """``execute``, timed as physics; this time does not count as the learner's."""
+        """A wrapper of ``execute`` that counts its time as physics, and takes this time off the learner's."""
 
         def timed(*arguments: Any) -> Any:
             begun = time.perf_counter()
@@ -73,7 +77,7 @@ class Seconds:
         return timed
 
     def of_learner(self, episodes: Iterator[Episode]) -> Iterator[Episode]:
-        """``episodes``, timed as part of the learner: asking, telling, watching and the teacher's choice."""
+        """The ``episodes``, whose time counts as the learner's: ask, tell, watch, and the choices of teachers."""
         while True:
             begun = time.perf_counter()
             episode = next(episodes, None)

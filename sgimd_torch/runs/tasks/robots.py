@@ -1,4 +1,4 @@
-"""Other robots as tasks. Their benchmark goals and demonstrations are made here and are equal for every seed."""
+"""Planar arms and a swimmer as tasks. Benchmark goals and demonstrations do not depend on the seed of a run."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from sgimd_torch.runs.tasks import Task
 from sgimd_torch.spaces import Array, Box, Demonstration, stream
 
 DATA: Final = SHIPPED_BENCHMARK.parent
-SIDE: Final = 0.1  # m, side of a benchmark tile; 311 goals lie in the disc of radius 1 m that these arms reach
-SHOWN: Final = 127  # demonstrations, as many as each shipped demonstrator recorded
-SAMPLES: Final = 5  # rows of the trajectory of each demonstration
+SIDE: Final = 0.1  # m, side of a benchmark tile; the disc of radius 1 m that an arm reaches has 311 goals
+SHOWN: Final = 127  # number of demonstrations, as of each shipped demonstrator
+SAMPLES: Final = 5  # number of samples in the trajectory of each demonstration
 
 
 def planar_arm(*, n_joints: int) -> Task:
@@ -45,15 +45,15 @@ def half_reached() -> Task:
 
 
 def arm_benchmark(arm: PlanarArm) -> Benchmark:
-    """One random goal in each tile of T that the arm can reach; equal in every run."""
+    """One random goal in each tile of T that the arm can reach; the goals are equal in every run."""
     box = arm.outcomes
     goals = tile_goals(np.tile(_grid(box, SIDE), (2, 1)), box, SIDE, stream(0, "goals for an arm"))
     return Benchmark(type(arm).__name__, goals[arm.reachable(goals)], SIDE)
 
 
 def arm_demonstrations(arm: PlanarArm) -> list[Demonstration]:
-    """Movements from rest to postures with equal joint angles; their ends spread evenly over the reachable disc."""
-    shares = (np.arange(SHOWN) + 0.5) / SHOWN  # shares of the disc's area, along a sunflower spiral
+    """Movements from rest to postures with all joint angles equal; outcomes spread evenly over the reachable disc."""
+    shares = (np.arange(SHOWN) + 0.5) / SHOWN  # shares of the disc's area, which make a sunflower spiral
     turns = np.pi * (3 - np.sqrt(5)) * np.arange(SHOWN)
     ends = np.sqrt(shares)[:, None] * np.stack([np.cos(turns), np.sin(turns)], axis=1)
     return [_led_to(arm, end) for end in ends]

@@ -1,4 +1,4 @@
-"""Toy robots as tasks. Their goals and demonstrations are made here and are equal for every seed."""
+"""Toy robots as tasks. Benchmark goals and demonstrations do not depend on the seed of a run."""
 
 from __future__ import annotations
 
@@ -13,48 +13,48 @@ from sgimd_torch.evaluation import Benchmark, tile_goals
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.spaces import Array, Demonstration, stream
 
-SHOWN: Final = 127  # demonstrations, as many as each shipped demonstrator recorded
-REACHING: Final = 20_000  # uniform movements that find the outcomes a toy can reach
+SHOWN: Final = 127  # number of demonstrations, as of each shipped demonstrator
+REACHING: Final = 20_000  # number of uniform movements by which the reachable part of T is found
 
 
 def toy(robot: Toy, side: float, *, taught: bool = False) -> Task:
-    """A toy robot. Its goals lie on tiles of this ``side``, in the unit of T. If it is ``taught``, it has a teacher."""
+    """Task of a toy robot, with one goal in each tile of a ``side`` (unit of T), and a teacher if it is ``taught``."""
     shown = partial(toy_demonstrations, robot) if taught else None
     return Task(robot, partial(toy_benchmark, robot, side), shown, last_row if taught else None)
 
 
 def toss() -> Task:
-    """A ball thrown in the wind; the wind is the context."""
+    """Ball that the robot throws in the wind; the wind is the context."""
     return toy(toys.toss(), 0.4, taught=True)
 
 
 def crawler() -> Task:
-    """Four legs, whose phases are periodic parameters."""
+    """Crawler with four legs; the phases of its legs are periodic parameters."""
     return toy(toys.crawler(), 0.1)
 
 
 def two_elbows() -> Task:
-    """An arm with two separate families of postures."""
+    """Arm that reaches each place by two separate families of postures."""
     return toy(toys.two_elbows(), 0.1)
 
 
 def spatial_arm() -> Task:
-    """An arm with six joints and three outcomes, in cm."""
+    """Arm with six joints in space; its outcome is a position of three dimensions, in cm."""
     return toy(toys.spatial_arm(), 25.0)
 
 
 def puck() -> Task:
-    """A puck that has to be hit; the place of the puck is the context."""
+    """Puck that the robot has to hit; the place of the puck is the context."""
     return toy(objects.puck(), 0.1)
 
 
 def fetch() -> Task:
-    """A ball that has to be grasped."""
+    """Ball that the robot has to grasp."""
     return toy(objects.fetch(), 0.1)
 
 
 def toy_benchmark(robot: Toy, side: float) -> Benchmark:
-    """One random goal in each tile that uniform movements reach in the middle of C; equal in every run."""
+    """One random goal in each tile that uniform movements reach in the middle of C; goals are equal in every run."""
     rng = stream(0, "goals for a toy")
     thetas = robot.policies.low + robot.policies.sides * rng.random((REACHING, robot.policies.dim))
     context = (robot.contexts.low + robot.contexts.high) / 2
@@ -63,12 +63,12 @@ def toy_benchmark(robot: Toy, side: float) -> Benchmark:
 
 
 def last_row(times: Array, trajectory: Array) -> Array:
-    """The correspondence of a toy: each row of its demonstrations is theta itself."""
+    """The correspondence of a toy: each sample of its recordings is theta itself."""
     return trajectory[-1]
 
 
 def toy_demonstrations(robot: Toy) -> list[Demonstration]:
-    """Uniform movements with different outcomes, in contexts all over C; equal in every run."""
+    """Uniform movements with distinct outcomes, in contexts all over C; they are equal in every run."""
     rng = stream(0, "demonstrations by a toy")
     thetas = robot.policies.low + robot.policies.sides * rng.random((REACHING, robot.policies.dim))
     found = []
