@@ -114,12 +114,16 @@ def _stop(signum: int, frame: FrameType | None) -> None:
 class Stopping:
     """A context manager. In its block the first SIGINT or SIGTERM is only noted; the second one raises ``Stopped``.
 
+    Args:
+        message: text to print at the first signal.
+
     Attributes:
         heard: number of the first signal; 0 if there was none.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, message: str = "stopping after this movement; Ctrl-C once more stops at once") -> None:
         self.heard = 0
+        self._message = message
         self._block = _on_signals(self._hear)
 
     def __enter__(self) -> Self:
@@ -134,7 +138,7 @@ class Stopping:
             raise Stopped(signum)
         self.heard = signum
         with suppress(OSError):  # say() could print into a print that the signal has interrupted
-            os.write(2, b"\nstopping after this movement; Ctrl-C once more stops at once\n")
+            os.write(2, f"\n{self._message}\n".encode())
 
 
 class Progress:

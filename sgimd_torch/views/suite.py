@@ -26,7 +26,7 @@ from typing import Any, Final
 from sgimd_torch.catalogue import ROD
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.read import finished
-from sgimd_torch.runs.sweep import add_engines, add_options, add_vary, carry_out, variants_of
+from sgimd_torch.runs.sweep import add_options, add_vary, carry_out, variants_of
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,6 @@ def parser() -> argparse.ArgumentParser:
     )
     add_vary(parser)
     add_options(parser, seeds="0")
-    add_engines(parser)
     return parser
 
 

@@ -65,14 +65,6 @@ def files_of(directory):
     return {path.name: path.read_bytes() for path in directory.iterdir()}
 
 
-def sweep_here(configs, processes=1, **options):
-    """On this machine; the failures."""
-    from sgimd_torch.runs.engines.loop import local, sweep
-
-    with local(processes) as submit:
-        return sweep(configs, submit, **options)
-
-
 def start(program, *options, limit=""):
     """Another process; ``limit`` is for ``ulimit``."""
     paths = [str(ROOT), os.environ.get("PYTHONPATH", "")]

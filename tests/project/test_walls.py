@@ -56,7 +56,6 @@ LIBRARIES = {  # library: the only rooms that may import it; of a folder, where 
     "sklearn": {"rivals"},
     "ribs": {"rivals"},
     "pyarrow": {"demonstrations/lerobot"},
-    "ray": {"runs/engines/on_ray"},
     "gymnasium": {"environments/from_gymnasium", "environments/to_gymnasium"},
 }
 WORLDS = {"environments"}
