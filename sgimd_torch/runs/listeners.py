@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any, Protocol
+from typing import Protocol
 
 from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.spaces import Episode
@@ -46,44 +46,19 @@ class Seconds:
     """Seconds spent so far, by part of the run. Physics and evaluation, which are not replayed, begin at ``before``."""
 
     def __init__(self, before: Mapping[str, float]) -> None:
-        self._spent = {part: before.get(f"seconds_{part}", 0.0) for part in ("physics", "evaluation")} | {
-            "learner": 0.0
-        }
+        self._spent = {part: before.get(f"seconds_{part}", 0.0) for part in ("physics", "evaluation")}
+        self._spent["learner"] = self._within = 0.0
 
     @contextmanager
     def of(self, part: str) -> Iterator[None]:
-        """Times a block."""
-        begun = time.perf_counter()
+        """A block, or a decorated function, of this part. Blocks within it count for their own parts alone."""
+        begun, around, self._within = time.perf_counter(), self._within, 0.0
         try:
             yield
         finally:
-            self._spend(part, begun)
-
-    def of_physics(self, execute: Callable[..., Any]) -> Callable[..., Any]:
-        """``execute``, timed as physics; this time does not count as the learner's."""
-
-        def timed(*arguments: Any) -> Any:
-            begun = time.perf_counter()
-            try:
-                return execute(*arguments)
-            finally:
-                self._spend("physics", begun)
-                self._spend("learner", begun, -1)
-
-        return timed
-
-    def of_learner(self, episodes: Iterator[Episode]) -> Iterator[Episode]:
-        """``episodes``, timed as part of the learner: asking, telling, watching and the teacher's choice."""
-        while True:
-            begun = time.perf_counter()
-            episode = next(episodes, None)
-            self._spend("learner", begun)
-            if episode is None:
-                return
-            yield episode
-
-    def _spend(self, part: str, begun: float, sign: int = 1) -> None:
-        self._spent[part] = self._spent.get(part, 0.0) + sign * (time.perf_counter() - begun)
+            passed = time.perf_counter() - begun
+            self._spent[part] = self._spent.get(part, 0.0) + passed - self._within
+            self._within = around + passed
 
     def summary(self) -> dict[str, float]:
         """Seconds by name, as the record stores them."""

@@ -6,11 +6,11 @@ print(carry_out(build(Config(seed=3)), stopping, resume=False, accept_loss=False
 from __future__ import annotations
 
 import math
-import re
 import time
 import traceback
 from collections.abc import Iterator
 from contextlib import suppress
+from functools import partial
 from typing import Final, Self
 
 from sgimd_torch.environments.protocol import FAILURES, SimulationError
@@ -24,7 +24,7 @@ from sgimd_torch.runs.process import Failed, Progress, Stopped, Stopping, say
 from sgimd_torch.session import NoOutcomeError, live, reason_of, run
 from sgimd_torch.spaces import Episode
 
-TOLD: Final = 3  # first failures, with a message each; a later failure has a message only if it is of a new kind
+TOLD: Final = 3  # first failures, with a message each; later ones are only counted
 COMMIT_EVERY: Final = 1.0  # s between two commits; a killed run loses the movements since the last commit
 
 
@@ -93,7 +93,6 @@ class Life:
             board = BoardListener(parts.config.directory, parts, self.seconds.summary, self._curves)
             self.listeners.append(board)
         self._wanted = set(parts.config.evaluations)
-        self._failures: list[str] = []  # kinds of failures that had a message
         self._committed = time.monotonic()
 
     def __enter__(self) -> Self:
@@ -107,7 +106,7 @@ class Life:
     def close(self, *, keep: bool = True) -> None:
         """Close record and listeners; ``keep`` commits the last movements first."""
         try:
-            if keep and not self.replaying and not self.record.failed:
+            if keep and not self.replaying:
                 self._settle()
         finally:
             self.record.close()
@@ -159,13 +158,14 @@ class Life:
             movements=parts.config.movements,
             teacher=parts.teacher,
             teachers=parts.teachers,
-            execute=self.seconds.of_physics(live(parts.environment, seed)),
+            execute=self.seconds.of("physics")(live(parts.environment, seed)),
             record=self.record,
             failures=parts.config.failures or FAILURES,
         )
         if not self.recorded:
             self._begin()
-        for episode in self.seconds.of_learner(episodes):
+        following = self.seconds.of("learner")(partial(next, episodes, None))
+        for episode in iter(following, None):
             self._after(episode)
             yield episode
 
@@ -189,11 +189,9 @@ class Life:
         self.movements = episode.index + 1
         if episode.failed:
             self.failed += 1
-            kind = re.sub(r"\d", "", episode.failed)
-            if not replayed and (len(self._failures) < TOLD or kind not in self._failures):
-                more = "; from now on such failures are only counted" if len(self._failures) == TOLD - 1 else ""
+            if not replayed and self.failed <= TOLD:
+                more = "; further failures are only counted" if self.failed == TOLD else ""
                 say(f"movement {episode.index} failed: {episode.failed}{more}")
-                self._failures.append(kind)
         for each in self.listeners:
             each.episode(episode, replayed)
         if self.movements in self._wanted:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import Final
 
@@ -17,40 +18,25 @@ SHOWN: Final = 127  # demonstrations, as many as each shipped demonstrator recor
 REACHING: Final = 20_000  # uniform movements that find the outcomes a toy can reach
 
 
-def toy(robot: Toy, side: float, *, taught: bool = False) -> Task:
+def toy(make: Callable[[], Toy], side: float, *, taught: bool) -> Task:
     """A toy robot. Its goals lie on tiles of this ``side``, in the unit of T. If it is ``taught``, it has a teacher."""
+    robot = make()
     shown = partial(toy_demonstrations, robot) if taught else None
     return Task(robot, partial(toy_benchmark, robot, side), shown, last_row if taught else None)
 
 
-def toss() -> Task:
-    """A ball thrown in the wind; the wind is the context."""
-    return toy(toys.toss(), 0.4, taught=True)
-
-
-def crawler() -> Task:
-    """Four legs, whose phases are periodic parameters."""
-    return toy(toys.crawler(), 0.1)
-
-
-def two_elbows() -> Task:
-    """An arm with two separate families of postures."""
-    return toy(toys.two_elbows(), 0.1)
-
-
-def spatial_arm() -> Task:
-    """An arm with six joints and three outcomes, in cm."""
-    return toy(toys.spatial_arm(), 25.0)
-
-
-def puck() -> Task:
-    """A puck that has to be hit; the place of the puck is the context."""
-    return toy(objects.puck(), 0.1)
-
-
-def fetch() -> Task:
-    """A ball that has to be grasped."""
-    return toy(objects.fetch(), 0.1)
+toss = partial(toy, toys.toss, 0.4, taught=True)
+"""A ball thrown in the wind; the wind is the context."""
+crawler = partial(toy, toys.crawler, 0.1, taught=False)
+"""Four legs, whose phases are periodic parameters."""
+two_elbows = partial(toy, toys.two_elbows, 0.1, taught=False)
+"""An arm with two separate families of postures."""
+spatial_arm = partial(toy, toys.spatial_arm, 25.0, taught=False)
+"""An arm with six joints and three outcomes, in cm."""
+puck = partial(toy, objects.puck, 0.1, taught=False)
+"""A puck that has to be hit; the place of the puck is the context."""
+fetch = partial(toy, objects.fetch, 0.1, taught=False)
+"""A ball that has to be grasped."""
 
 
 def toy_benchmark(robot: Toy, side: float) -> Benchmark:
