@@ -117,7 +117,7 @@ class Trained(ABC):
 
     @abstractmethod
     def listener(self, life: Any) -> Any:
-        """A `runs.listeners.Listener` that calls `refresh` in this `runs.run.Life`."""
+        """A `runs.run.Listener` that calls `refresh` in this `Life`."""
 
 
 class Goals(Part):

@@ -7,6 +7,7 @@ Exit codes: 0 done, 1 failed while running, 2 the request is wrong, 130 stopped 
 
 from __future__ import annotations
 
+import argparse
 import io
 import os
 import signal
@@ -80,6 +81,12 @@ def command(main: Callable[[Sequence[str]], int], argv: Sequence[str] | None = N
         say(f"error: not everything could be written: {lost.strerror}")
         return 1
     return code
+
+
+def parser_of(name: str, about: str | None, **more: Any) -> argparse.ArgumentParser:
+    """A parser for the options of ``sgimd name``. Its help shows the text ``about`` with its line ends."""
+    form = argparse.RawDescriptionHelpFormatter
+    return argparse.ArgumentParser(f"sgimd {name}", description=about, formatter_class=form, allow_abbrev=False, **more)
 
 
 def _sink() -> TextIO:

@@ -8,18 +8,18 @@ from __future__ import annotations
 import math
 import time
 import traceback
-from collections.abc import Iterator
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from functools import partial
-from typing import Final, Self
+from typing import Final, Protocol, Self
 
 from sgimd_torch.environments.protocol import FAILURES, SimulationError
+from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.record import RunError
 from sgimd_torch.record.replay import ReplayError
 from sgimd_torch.runs.build import RunParts
 from sgimd_torch.runs.directory import open_run
 from sgimd_torch.runs.evaluations import Evaluations
-from sgimd_torch.runs.listeners import Listener, Seconds
 from sgimd_torch.runs.process import Failed, Progress, Stopped, Stopping, say
 from sgimd_torch.session import NoOutcomeError, live, reason_of, run
 from sgimd_torch.spaces import Episode
@@ -216,3 +216,57 @@ class Life:
         for each in self.listeners:
             each.begin()
         self.commit()
+
+
+class Listener(Protocol):
+    """Listener of a run. A resumed run first tells its listeners everything that is in the record.
+
+    A listener overrides the methods that it needs.
+    """
+
+    def episode(self, episode: Episode, replayed: bool) -> None:
+        """A movement was made, or replayed."""
+        return
+
+    def evaluated(self, movements: int, found: Mapping[str, Evaluation]) -> None:
+        """The learner was evaluated after this number of movements; ``found`` is by name of the inverse model."""
+        return
+
+    def begin(self) -> None:
+        """The replay is over: from now on files may change."""
+        return
+
+    def curves(self) -> Mapping[str, float]:
+        """Numbers for the board since the last call, by tag."""
+        return {}
+
+    def flush(self) -> None:
+        """Write everything so far to the disk."""
+        return
+
+    def close(self) -> None:
+        """The run has ended, or was stopped."""
+        return
+
+
+class Seconds:
+    """Seconds spent so far, by part of the run. Physics and evaluation, which are not replayed, begin at ``before``."""
+
+    def __init__(self, before: Mapping[str, float]) -> None:
+        self._spent = {part: before.get(f"seconds_{part}", 0.0) for part in ("physics", "evaluation")}
+        self._spent["learner"] = self._within = 0.0
+
+    @contextmanager
+    def of(self, part: str) -> Iterator[None]:
+        """A block, or a decorated function, of this part. Blocks within it count for their own parts alone."""
+        begun, around, self._within = time.perf_counter(), self._within, 0.0
+        try:
+            yield
+        finally:
+            passed = time.perf_counter() - begun
+            self._spent[part] = self._spent.get(part, 0.0) + passed - self._within
+            self._within = around + passed
+
+    def summary(self) -> dict[str, float]:
+        """Seconds by name, as the record stores them."""
+        return {f"seconds_{part}": round(seconds, 3) for part, seconds in self._spent.items()}

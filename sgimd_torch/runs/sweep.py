@@ -32,7 +32,7 @@ from sgimd_torch.files import make_folder
 from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.config import Config, dashed
 from sgimd_torch.runs.parallel import sweep
-from sgimd_torch.runs.process import loading, say
+from sgimd_torch.runs.process import loading, parser_of, say
 from sgimd_torch.runs.read import finished, movements_on_disk
 
 Item = TypeVar("Item")
@@ -45,12 +45,8 @@ NOT_VARIED: Final = {
 
 def parser() -> argparse.ArgumentParser:
     """The options of ``sgimd sweep``."""
-    parser = argparse.ArgumentParser(
-        prog="sgimd sweep",
-        usage="%(prog)s [--vary OPTION=VALUE,VALUE ...] [--seeds SEEDS] [--OPTION VALUE ...]",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
+    parser = parser_of(
+        "sweep", __doc__, usage="%(prog)s [--vary OPTION=VALUE,VALUE ...] [--seeds SEEDS] [--OPTION VALUE ...]"
     )
     add_vary(parser)
     add_options(parser, seeds="0")

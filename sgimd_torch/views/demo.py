@@ -32,7 +32,7 @@ from sgimd_torch.figures.names import label
 from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.parallel import sweep
-from sgimd_torch.runs.process import Failed, loading, say
+from sgimd_torch.runs.process import Failed, loading, parser_of, say
 from sgimd_torch.runs.read import finished, read_run
 
 LEARNERS: Final = {
@@ -98,10 +98,4 @@ def configs_of(rest: Sequence[str]) -> dict[str, Config]:
 
 def parser() -> argparse.ArgumentParser:
     """The options of ``sgimd demo``."""
-    return argparse.ArgumentParser(
-        prog="sgimd demo",
-        usage="%(prog)s [--OPTION VALUE ...]",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
-    )
+    return parser_of("demo", __doc__, usage="%(prog)s [--OPTION VALUE ...]")

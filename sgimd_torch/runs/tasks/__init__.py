@@ -1,6 +1,6 @@
 """Task: an environment with benchmark goals, demonstrations and a correspondence for them.
 
-The catalogue has the tasks of ``rods.py``, ``robots.py`` and ``toys.py``. A function of yours may return one, too:
+The catalogue has the tasks of ``rods.py`` and ``robots.py``. A function of yours may return one, too:
     def make(): return Task(Toss(), benchmark=my_goals, demonstrations=Path("shown.npz"), correspondence=translate)
 """
 
