@@ -15,7 +15,6 @@ LEGEND: Final[Mapping[str, str]] = {
     "error/noise_floor": "Part UNIT of error/mean that motor noise alone makes.",
     "error": "Mean error UNIT if another inverse model answers. All runs have by_linear, so this curve compares "
     "learners without the influence of their inverse models.",
-    "met": "Share of the benchmark goals in a place that are met: their error is half the side of a tile or less.",
     "competence": "Mean competence of the goals that a region remembers: 0 is met, -1 no better than rest. R is all of "
     "C x T, R0 and R1 are its two parts, R01 is a part of R0; map/competence shows them. Other runs have other "
     "regions. After a cut of the region, the curve is the mean over the goals of its parts.",
@@ -24,6 +23,7 @@ LEGEND: Final[Mapping[str, str]] = {
     "regions": "Number of regions of the goal model.",
     "regime": "Share of the last movements by origin: global exploration, local optimisation, imitation, babbling or "
     "rest; failed is the share of movements that failed.",
+    "goals/met": "Share of the benchmark goals that are met: their error is half the side of a tile or less.",
     "goals/reached": "Share of the last 50 goals that a movement reached within the tolerance.",
     "goals/missed_by": "Distance UNIT from a goal to its nearest outcome, median over the last 50 goals.",
     "teacher/demonstrations": "Number of demonstrations so far.",

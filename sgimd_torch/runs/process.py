@@ -45,14 +45,14 @@ def command(main: Callable[[Sequence[str]], int], argv: Sequence[str] | None = N
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # the locale may lack signs of a name
-    code, lost = 0, None
+    code = 0
     with _on_signals(_stop):
         try:
-            code = main(sys.argv[1:] if argv is None else argv)
-        except SystemExit as end:
-            code = end.code if isinstance(end.code, int) else int(end.code is not None)
-            if code and not isinstance(end.code, int):
-                say(f"error: {end.code}")
+            try:
+                code = main(sys.argv[1:] if argv is None else argv)
+            except SystemExit as end:  # of argparse, after --help or a wrong option
+                code = int(end.code or 0)
+            sys.stdout.flush()
         except KeyboardInterrupt as stop:
             code = stop.exit_code if isinstance(stop, Stopped) else 130
         except Failed as error:
@@ -61,25 +61,20 @@ def command(main: Callable[[Sequence[str]], int], argv: Sequence[str] | None = N
         except (ValueError, ImportError) as error:
             say(f"error: {error}")
             code = 2
+        except BrokenPipeError:  # a reader such as head has seen enough
+            pass
         except OSError as error:
-            code = 2
+            code, why = 2, str(error)  # an error of this library has a complete message
             if error.filename is not None:
-                say(f"error: {error.filename} cannot be read or written: {error.strerror}")
-            elif error.errno is None:  # an error of this library, with a complete message
-                say(f"error: {error}")
-            else:  # an error of stdout or of the disk
-                lost = error
+                why = f"{error.filename} cannot be read or written: {error.strerror}"
+            elif error.errno is not None:
+                code, why = 1, f"not everything could be written: {error.strerror}"
+            say(f"error: {why}")
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()
-        except OSError as error:
+        except OSError:
             os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())  # the interpreter would complain at exit
-            lost = error if stream is sys.stdout else lost
-    if lost is not None:
-        if isinstance(lost, BrokenPipeError):
-            return 0 if code == 2 else code
-        say(f"error: not everything could be written: {lost.strerror}")
-        return 1
     return code
 
 
