@@ -56,7 +56,7 @@ def sweep(
     done = {config: _on_disk(config) for config in configs}
     failures: dict[Config, str] = {}
     waiting, running = [*reversed(configs)], dict[Config, tuple[Process, int]]()
-    bar = Progress("sweep", sum(config.movements for config in configs), sum(done.values()), every=30.0)
+    bar = Progress("sweep", sum(config.movements for config in configs), sum(done.values()))
     with Stopping("stopping all runs; the same command continues them") as stopping, bar as progress:
         try:
             while (waiting or running) and not stopping.heard:

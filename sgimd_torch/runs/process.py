@@ -19,7 +19,7 @@ from contextlib import AbstractContextManager, contextmanager, suppress
 from types import FrameType
 from typing import Any, Final, Self, TextIO
 
-REPORT_EVERY: Final = 10.0  # s between two lines of progress if stderr is no terminal
+REPORT_EVERY: Final = 20.0  # s between two lines of progress if stderr is no terminal
 SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
 
 
@@ -150,11 +150,9 @@ class Progress:
         title: name of the work in progress.
         total: number of movements in all; the attribute may be changed later.
         done: number of movements made earlier; these do not count for the speed.
-        every: seconds between two plain lines.
     """
 
-    def __init__(self, title: str, total: int, done: int = 0, *, every: float = REPORT_EVERY) -> None:
-        self._every = every
+    def __init__(self, title: str, total: int, done: int = 0) -> None:
         self._bar: Any = None
         self.begin(title, total, done)
 
@@ -181,7 +179,7 @@ class Progress:
         self._bar.set_postfix_str(note, refresh=False)
         self._bar.update(done - self._bar.n)
         now = time.monotonic()
-        if not self._bar.disable or now - self._reported < self._every or done <= self._first:
+        if not self._bar.disable or now - self._reported < REPORT_EVERY or done <= self._first:
             return
         self._reported = now
         rate = (done - self._first) / (now - self._begun)
