@@ -1,4 +1,4 @@
-"""The claims of each page of results, each with its bar: first the paper's, then ours.
+"""The claims of each page of results, each with its bar: first the claims of the paper, then ours.
 
 for verdict in judge(paper(found, letter=True)): print(verdict.claim, verdict.verdict)
 """
@@ -23,20 +23,21 @@ EVERY, COST = 30, 10  # movements between two demonstrations of SGIM-D; cost of 
 
 
 def less(found: Evidence, ours: str, theirs: str, *times: int, name: str = "") -> list[Part]:
-    """A part for each time, which says that our error is smaller than theirs."""
+    """Parts of a claim, one for each number of movements in ``times``: our error is smaller than theirs."""
     names = {at: f"{name} at {at}".strip() if len(times) > 1 else name for at in times or (LAST,)}
     return [at_most(0.0, found.difference, ours, theirs, at, name=each, form="+.4f") for at, each in names.items()]
 
 
 def times_as_much(found: Evidence, bar: float, ours: str, theirs: str, *times: int) -> list[Part]:
-    """A part for each time, which says that our error is at most ``bar`` times theirs."""
+    """Parts of a claim, one for each number of movements in ``times``: our error is at most ``bar`` times theirs."""
     return [at_most(bar, found.ratio, ours, theirs, at, name=f"at {at}") for at in times]
 
 
 def paper(found: Evidence, *, letter: bool) -> list[Claim]:
-    """Claims of section 6 of the paper, on learners to the ``letter``, for which eq. (9) answers, or on our learners.
+    """Claims of section 6 of the paper, on learners by the ``letter`` of the paper, or else on our learners.
 
-    If a claim says nothing else, it is about 5000 movements with a demonstration of demonstrator 3 every 30 movements.
+    For learners by the letter, eq. (9) answers. Unless a claim says otherwise, it is about 5000 movements, with a
+    demonstration of demonstrator 3 every 30 movements.
     """
 
     def our(algorithm: str, where: str = "") -> str:
@@ -57,52 +58,53 @@ def paper(found: Evidence, *, letter: bool) -> list[Claim]:
     ]
     large, sagg_riac_large = our("sgim-d", "-large"), our("sagg-riac", "-large")
     return [
-        Claim("Observation errs most: Random − Observation < 0", less(found, random, observation),
-              "By `process` what was watched answers about as well as random movements."),
-        Claim("SAGG-RIAC errs clearly less than Random: ratio ≤ 0.85", [at_most(0.85, found.ratio, sagg_riac, random)],
-              "Choosing goals pays."),
+        Claim("Observation has the largest error: Random − Observation < 0", less(found, random, observation),
+              "With `process`, watched demonstrations give answers about as good as random movements do."),
+        Claim("The error of SAGG-RIAC is clearly smaller than that of Random: ratio ≤ 0.85",
+              [at_most(0.85, found.ratio, sagg_riac, random)], "Choosing goals reduces the error."),
         Claim("... from the beginning: difference < 0 at 250, 500, 1000",
-              less(found, sagg_riac, random, 250, 500, 1000), "At first few goals were tried."),
-        Claim("Imitation errs less than Random: difference < 0", less(found, imitation, random), "Being shown pays."),
-        Claim("... about as much as SAGG-RIAC: ratio 0.80 to 1.25",
+              less(found, sagg_riac, random, 250, 500, 1000), "At first SAGG-RIAC has tried only few goals."),
+        Claim("The error of Imitation is smaller than that of Random: difference < 0", less(found, imitation, random),
+              "Demonstrations reduce the error."),
+        Claim("... about as large as that of SAGG-RIAC: ratio 0.80 to 1.25",
               [at_most(1.25, found.ratio, imitation, sagg_riac), at_least(0.8, found.ratio, imitation, sagg_riac)],
-              "By `process` it rather errs less."),
+              "With `process`, the error of Imitation tends to be smaller."),
         Claim("... and varies less over seeds: ratio of variances ≤ 0.50",
-              [at_most(0.5, found.variance_ratio, imitation, sagg_riac)], "Teachers make lives alike."),
-        Claim("SGIM-D errs least: probability of improvement ≥ 0.95, intervals above 0.75, against each of four", best,
-              "To the letter SAGG-RIAC comes close."),
-        Claim("SGIM-D halves Random's error: ratio ≤ 0.50, interval up to 0.55",
-              [at_most(0.5, found.ratio, sgim_d, random, margin=0.05)], "Eq. (9) answers coarsely."),
-        Claim("... comes near the noise: ≤ 1.25 times its noise floor",
-              [at_most(1.25, found.over_floor, sgim_d, sgim_d)], "An error of the answers is left."),
-        Claim("... from the beginning: at Random's last error in < 1000 movements",
+              [at_most(0.5, found.variance_ratio, imitation, sagg_riac)], "A teacher makes seeds more alike."),
+        Claim("SGIM-D has the smallest error: probability of improvement over each of the four others ≥ 0.95, "
+              "intervals above 0.75", best, "By the letter, SAGG-RIAC comes close."),
+        Claim("SGIM-D halves the error of Random: ratio ≤ 0.50, interval up to 0.55",
+              [at_most(0.5, found.ratio, sgim_d, random, margin=0.05)], "The answers of eq. (9) are coarse."),
+        Claim("... its error comes near its noise floor: ratio ≤ 1.25",
+              [at_most(1.25, found.over_floor, sgim_d, sgim_d)], "A part of the error comes from the inverse model."),
+        Claim("... it reaches the last error of Random in less than 1000 movements",
               [at_most(np.nextafter(1000, 0), found.time_to_reach, sgim_d, random, form=".0f")],
               "Teaching helps early."),
-        Claim("SAGG-RIAC reaches more tiles than Random",
-              [at_least(0, found.more_tiles, sagg_riac, random, form="+.0f")], "Goals widen the range."),
+        Claim("SAGG-RIAC reaches more benchmark tiles than Random",
+              [at_least(0, found.more_tiles, sagg_riac, random, form="+.0f")], "Goals widen the reached part of T."),
         Claim("... and SGIM-D more than SAGG-RIAC", [at_least(0, found.more_tiles, sgim_d, sagg_riac, form="+.0f")],
-              "Our SGIM-D stays near what it was shown."),
-        Claim("With each of three demonstrators SGIM-D errs less than SAGG-RIAC and Imitation: six differences < 0",
-              taught, "With the careful demonstrator 2 Imitation is enough."),
-        Claim("Demonstrator 3 is better for SGIM-D than 2, and 2 than 1: two differences < 0",
+              "Our SGIM-D stays near the demonstrated outcomes."),
+        Claim("With each of three demonstrators, the error of SGIM-D is smaller than those of SAGG-RIAC and Imitation: "
+              "six differences < 0", taught, "With the careful demonstrator 2, Imitation is as good."),
+        Claim("Demonstrator 3 is better for SGIM-D than 2, and 2 is better than 1: two differences < 0",
               [*less(found, sgim_d, our("sgim-d", "-teacher-2"), name="3 and 2"),
                *less(found, our("sgim-d", "-teacher-2"), our("sgim-d", "-teacher-1"), name="2 and 1")],
-              "Structure helps most, care second."),
+              "Structured demonstrations help most, careful ones second."),
         Claim("Demonstrators 1 and 2 are better for Observation than 3: two differences < 0",
               [part for number in (1, 2)
                for part in less(found, our("observation", f"-teacher-{number}"), observation, name=f"{number} and 3")],
-              "True of demonstrator 2 alone."),
-        Claim("T 10⁴ times larger: SAGG-RIAC still errs less than Random", less(found, sagg_riac_large, random),
-              "Nearly all its goals are out of reach."),
-        Claim("... its error grows more than SGIM-D's: ratio of ratios > 1",
+              "Only demonstrator 2 is better."),
+        Claim("T 10⁴ times larger: the error of SAGG-RIAC is still smaller than that of Random",
+              less(found, sagg_riac_large, random), "Nearly all goals of SAGG-RIAC are out of reach."),
+        Claim("... the error of SAGG-RIAC grows more than that of SGIM-D: ratio of ratios > 1",
               [at_least(1.0, found.growth_ratio, (sagg_riac, sagg_riac_large), (sgim_d, large))],
-              "The teacher saves SGIM-D."),
-        Claim("... SGIM-D errs little more than in the small T: ratio ≤ 1.20",
-              [at_most(1.2, found.ratio, large, sgim_d)], "About a fifth more."),
-        Claim("... and less than SAGG-RIAC and Random: two differences < 0",
+              "The teacher shows SGIM-D the part within reach."),
+        Claim("... the error of SGIM-D is little larger than in the small T: ratio ≤ 1.20",
+              [at_most(1.2, found.ratio, large, sgim_d)], "The error is about a fifth larger."),
+        Claim("... and smaller than those of SAGG-RIAC and Random: two differences < 0",
               [*less(found, large, sagg_riac_large, name="SAGG-RIAC"), *less(found, large, random, name="Random")],
-              "Clearly."),
-        Claim("... since it aims where it can reach: share of such goals ≥ 10 times SAGG-RIAC's",
+              "The error is much smaller."),
+        Claim("... because SGIM-D chooses goals within reach: share of such goals ≥ 10 times that of SAGG-RIAC",
               [at_least(10, found.near_ratio, large, sagg_riac_large, form=".0f")],
               "Our interest finds the part that can be reached."),
     ]  # fmt: skip
@@ -131,43 +133,43 @@ def learning(found: Evidence) -> list[Claim]:
         return [at_most(bar, found.over_tasks, *names, at, name=f"{theirs} at {at}") for at in times]
 
     return [
-        Claim("`practice-taught` errs little early: ≤ 0.105, 0.070, 0.046 m at 250, 500, 1000",
+        Claim("`practice-taught` has a small error early: ≤ 0.105, 0.070, 0.046 m at 250, 500, 1000",
               [at_most(bar, found.error, taught, at, name=f"at {at}", form=".4f")
                for at, bar in ((250, 0.105), (500, 0.070), (1000, 0.046))]),
         Claim("... and late: ≤ 0.0325 m at 5000", [at_most(0.0325, found.error, taught, form=".4f")]),
         Claim("... ≤ 1.03 times its noise floor",
               [at_most(1.03, found.over_floor, taught, taught)]),
-        Claim("... less than SGIM-D and three rivals, all shown all at the start: < 0 at 250, 500, 1000, 5000",
-              same_schedule(taught, "-once")),
-        Claim("... and all shown one every 30: < 0 at 250, 500, 1000, 5000",
+        Claim("... smaller than SGIM-D and three rivals if all get all demonstrations at the start: < 0 at 250, 500, "
+              "1000, 5000", same_schedule(taught, "-once")),
+        Claim("... and if all get a demonstration every 30 movements: < 0 at 250, 500, 1000, 5000",
               same_schedule("practice-taught-every-30.rod", "")),
-        Claim("... shown one corner only, no more than untaught: ≤ 1.03 times, 250 to 5000",
+        Claim("... with demonstrations in one corner only, no larger than without: ≤ 1.03 times, 250 to 5000",
               times_as_much(found, 1.03, "practice-corner.rod", uniform, *WHOLE)),
-        Claim("`practice`, without a teacher, errs less than CMA-MAE: < 0 at 1000, 2000, 5000",
+        Claim("`practice`, without a teacher, has a smaller error than CMA-MAE: < 0 at 1000, 2000, 5000",
               less(found, alone, "cma-mae.rod", 1000, 2000, LAST)),
-        Claim("... as little in a T 100 times too wide: ≤ 1.15 times, 500 to 2000",
+        Claim("... hardly a larger error in a T with sides 100 times longer: ≤ 1.15 times, 500 to 2000",
               times_as_much(found, 1.15, "practice.rod-large", alone, *TIMES[1:])),
-        Claim("... and where most movements do nothing, `puck`: ≤ 0.60 times random movements at 2000",
+        Claim("... on `puck`, where most movements do nothing, ≤ 0.60 times the error of random movements at 2000",
               times_as_much(found, 0.6, "practice.puck", f"{RANDOM}.puck", 2000)),
-        Claim("... there and on `fetch` less than SAGG-RIAC and the standard baseline: < 0 at 2000",
+        Claim("... on `puck` and `fetch` a smaller error than SAGG-RIAC and the standard baseline: < 0 at 2000",
               [part for task in SPARSE for name in ("sagg-riac", UNIFORM)
                for part in less(found, f"practice.{task}", f"{name}.{task}", 2000, name=f"{name}, {task}")]),
-        Claim("SGIM-D errs less than the standard baseline, both shown one every 30: < 0 at 5000",
-              less(found, "sgim-d.rod", "uniform-nearest-taught.rod")),
-        Claim("Suite: `practice` never errs more than random movements: ≤ 1.02 times, 250 to 2000",
+        Claim("SGIM-D has a smaller error than the standard baseline if both get a demonstration every 30 movements: "
+              "< 0 at 5000", less(found, "sgim-d.rod", "uniform-nearest-taught.rod")),
+        Claim("Suite: `practice` never has a larger error than random movements: ≤ 1.02 times, 250 to 2000",
               on_each_task(RANDOM, 1.02)),
         Claim("... nor than the standard baseline: ≤ 1.05 times", on_each_task(UNIFORM, 1.05)),
-        Claim("... less over tasks: mean ratio ≤ 0.75 at 1000",
+        Claim("... over all tasks, a smaller error than the standard baseline: mean ratio ≤ 0.75 at 1000",
               over_tasks(UNIFORM, 0.75, 1000)),
-        Claim("... than CMA-MAE and MAP-Elites: mean ratios < 1 at 500, 1000, 2000",
+        Claim("... and than CMA-MAE and MAP-Elites: mean ratios < 1 at 500, 1000, 2000",
               [part for name in ("cma-mae", "map-elites") for part in over_tasks(name, 1.0, 500, 1000, 2000)]),
-        Claim("... and more movements never hurt: at 2000 ≤ at 500",
+        Claim("... on no task a larger error at 2000 than at 500",
               [at_most(1.0, found.growth, f"practice.{task}", 2000, 500, name=task) for task in (*SUITE, *SPARSE)]),
     ]  # fmt: skip
 
 
 def answers(found: Evidence) -> list[Claim]:
-    """Claims on inverse models, for memories of 250 to 2000 movements on the suite and of SUITED on the rod."""
+    """Claims on inverse models, which answer from the memories of all learners of the suite on all its tasks."""
     memories = [*EXPERIMENTS["suite"], *(f"{name}.rod" for name in SUITED)]
 
     def proved(other: str) -> list[Part]:
@@ -178,32 +180,32 @@ def answers(found: Evidence) -> list[Claim]:
         ]
 
     return [
-        Claim("`process` answers no worse than the nearest exemplar: ≤ 1.02 times on 48 memories",
+        Claim("`process` has no larger error than the nearest exemplar: ≤ 1.02 times on 48 memories",
               proved("nearest")),
         Claim("... nor than `LocallyLinear`: ≤ 1.02 times", proved("linear")),
     ]  # fmt: skip
 
 
 def curiosity(found: Evidence) -> list[Claim]:
-    """Claims on the gain from choosing goals, and on the gain from choosing goals by interest."""
+    """Claims on what choosing goals gains over choosing movements, and what interest gains over uniform goals."""
     return [
-        Claim("Goals in the place of movements: SAGG-RIAC − Random < 0",
+        Claim("Choosing goals instead of movements: SAGG-RIAC − Random < 0",
               less(found, "sagg-riac.rod", "random-nearest.rod")),
-        Claim("Interest where nearly all can be reached: SGIM-D − SGIM-D with uniform goals < 0",
+        Claim("Interest in the small T, nearly all within reach: SGIM-D − SGIM-D with uniform goals < 0",
               less(found, "sgim-d.rod", "sgim-d-uniform.rod")),
-        Claim("Interest in a T 10⁴ times larger, by our measure: the same difference < 0",
+        Claim("Interest in a T 10⁴ times larger, by our definition: SGIM-D − SGIM-D with uniform goals < 0",
               less(found, "sgim-d-large", "sgim-d-uniform-large")),
         Claim("... by the paper's eq. (3): the same difference < 0",
               less(found, "sgim-d-absolute-large", "sgim-d-uniform-large")),
-        Claim("Interest and simplex there: SGIM-D − the standard baseline, both shown one every 30, < 0",
-              less(found, "sgim-d-large", "random-goals-demonstrations-large")),
-        Claim("Interest in the place of uniform goals in `practice`: < 0 at 1000, 5000",
+        Claim("Interest and simplex in this T: SGIM-D − the standard baseline < 0, both with a demonstration every 30 "
+              "movements", less(found, "sgim-d-large", "random-goals-demonstrations-large")),
+        Claim("Interest instead of uniform goals in `practice`: < 0 at 1000, 5000",
               less(found, "practice-interest.rod", "practice-uniform.rod", 1000, LAST)),
     ]  # fmt: skip
 
 
 def model(found: Evidence) -> list[Claim]:
-    """Claims on SGIM-D with a forward model instead of `process`: one that proves itself first, one always asked."""
+    """Claims on SGIM-D with a forward model instead of `process`: one has to prove itself first, one always answers."""
     proved, always, plain = "sgim-d-model.rod by model", "gradient by model-alone", "sgim-d"
     on_arms = [
         at_most(1.03, found.ratio, f"sgim-d-model.{arm} by model", f"sgim-d{arm.removeprefix('planar')}", at,
@@ -212,24 +214,25 @@ def model(found: Evidence) -> list[Claim]:
         for at in TIMES
     ]  # fmt: skip
     return [
-        Claim("`--inverse model`: SGIM-D errs ≤ 0.055, 0.042, 0.0365 m at 1000, 2000, 5000",
+        Claim("`--inverse model`: the error of SGIM-D is ≤ 0.055, 0.042, 0.0365 m at 1000, 2000, 5000",
               [at_most(bar, found.error, proved, at, name=f"at {at}", form=".4f")
                for at, bar in ((1000, 0.055), (2000, 0.042), (LAST, 0.0365))]),
-        Claim("... never harms it: ≤ 1.03 times, rod 250 to 5000, arms of 7 and 50 joints 250 to 2000",
-              [*times_as_much(found, 1.03, proved, "sgim-d.rod", *WHOLE), *on_arms]),
-        Claim("... nor Imitation: ≤ 1.03 times `process` on the same memory, 250 to 5000",
+        Claim("... never much larger than with `process`: ≤ 1.03 times, on the rod at 250 to 5000, on arms of 7 and 50 "
+              "joints at 250 to 2000", [*times_as_much(found, 1.03, proved, "sgim-d.rod", *WHOLE), *on_arms]),
+        Claim("... nor is that of Imitation: ≤ 1.03 times `process` on the same memory, 250 to 5000",
               times_as_much(found, 1.03, "imitation.rod by model", "imitation.rod", *WHOLE)),
-        Claim("`gradient`, always asked, needs fewer movements: SGIM-D's last error in ≤ 3000",
+        Claim("`gradient`, with a model that always answers, reaches the last error of SGIM-D in ≤ 3000 movements",
               [at_most(3000, found.time_to_reach, always, plain, form=".0f")]),
-        Claim("... errs less: < 0 at 1000, 2000, 5000", less(found, always, plain, 1000, 2000, LAST)),
-        Claim("... less than the noise floor of SGIM-D at 5000", [at_most(1.0, found.over_floor, always, plain)]),
-        Claim("... half as much on an arm of 50 joints at 2000: ratio ≤ 0.50",
+        Claim("... has a smaller error than SGIM-D: < 0 at 1000, 2000, 5000",
+              less(found, always, plain, 1000, 2000, LAST)),
+        Claim("... at 5000 an error below the noise floor of SGIM-D", [at_most(1.0, found.over_floor, always, plain)]),
+        Claim("... on an arm of 50 joints half the error of SGIM-D at 2000: ratio ≤ 0.50",
               times_as_much(found, 0.5, "gradient-arm-50 by model-alone", "sgim-d-arm-50", 2000)),
     ]  # fmt: skip
 
 
 def asking(found: Evidence) -> list[Claim]:
-    """Claims on learners that ask: when, how much, whom, where and at which cost they ask."""
+    """Claims on learners that ask: when, how often, whom and where they ask, and at which cost."""
     im, dear, sgim_d, toss = "sgim-im", "sgim-im-cost-10", "taught-every-30", "sgim-im-toss"
 
     def asked(name: str, what: str, teachers: Sequence[str] = ()) -> pd.Series:
@@ -242,7 +245,7 @@ def asking(found: Evidence) -> list[Claim]:
         return found.less(asked(name, what), asked(other, than), level=level)
 
     def at_equal_cost(*, level: Level = LEVEL) -> Interval:
-        """Our error minus that of SGIM-D at equal cost, on straight lines between the evaluations of SGIM-D."""
+        """Our error minus that of SGIM-D at equal cost; errors of SGIM-D are interpolated between its evaluations."""
         ours, shown = shared(found.at(dear), asked(dear, "shown"))
         costs = (LAST + COST * shown) / (1 + COST / EVERY)
         curve = found.curve(sgim_d)
@@ -251,27 +254,29 @@ def asking(found: Evidence) -> list[Claim]:
         return found.less(ours, theirs, level=level)
 
     return [
-        Claim("When: SGIM-IM errs less than SGIM-D, shown one every 30: < 0 at 1000",
+        Claim("When to ask: SGIM-IM has a smaller error than SGIM-D with a demonstration every 30: < 0 at 1000",
               less(found, im, sgim_d, 1000)),
-        Claim("... no more than SGIM-D that is shown all 127 at the start: ≤ 0 at 5000",
+        Claim("... no larger error than SGIM-D with all 127 demonstrations at the start: ≤ 0 at 5000",
               less(found, im, "taught-at-start")),
-        Claim("... nor than `practice-taught`, shown all at the start, too", less(found, im, "taught-at-start-once")),
-        Claim("How few: with 83 demonstrations to ask for it errs no more than SGIM-D with 127",
+        Claim("... nor than `practice-taught` with all 127 at the start", less(found, im, "taught-at-start-once")),
+        Claim("How many: with 83 demonstrations to ask for, SGIM-IM has no larger error than SGIM-D with 127",
               less(found, "sgim-im-83", sgim_d)),
-        Claim("Whom: of four teachers, one mislabelling, SGIM-ACTS learns as from each one alone: ratios ≤ 1.05",
+        Claim("Whom to ask: SGIM-ACTS learns from four teachers, one of whom mislabels, as well as from each of the "
+              "other three alone: ratios ≤ 1.05",
               [at_most(1.05, found.ratio, "sgim-acts-four", f"sgim-acts-{k}", name=f"teacher {k}") for k in (1, 2, 3)]),
-        Claim("... and leaves the one who mislabels: ≤ 10 % of the requests after 1000",
+        Claim("... and seldom asks the teacher who mislabels: ≤ 10 % of the requests after 1000",
               [at_most(0.1, late, "sgim-acts-four", "late", ("mislabelling",), FOUR)]),
-        Claim("Where: of two teachers with a half each, it asks in their own half: ≥ 80 % of those after 1000",
-              [at_least(0.8, late, "sgim-acts-halves", "late_own", HALVES, HALVES)]),
-        Claim("Cost: when a demonstration costs ten movements, it is shown fewer",
+        Claim("Where to ask: if two teachers know one half of T each, ≥ 80 % of the requests after 1000 are for the "
+              "teacher's own half", [at_least(0.8, late, "sgim-acts-halves", "late_own", HALVES, HALVES)]),
+        Claim("Cost: if a demonstration costs ten movements, SGIM-IM gets fewer demonstrations",
               [at_most(0, more, "shown", dear, "shown", im, form="+.0f")]),
-        Claim("... and errs less than SGIM-D at equal total cost", [at_most(0, at_equal_cost, form="+.4f")]),
-        Claim("Against information: less than asking by entropy: < 0 at 1000, 5000",
+        Claim("... and has a smaller error than SGIM-D at equal total cost",
+              [at_most(0, at_equal_cost, form="+.4f")]),
+        Claim("Entropy: SGIM-IM has a smaller error than a learner that asks by entropy: < 0 at 1000, 5000",
               less(found, im, "sgim-eer", 1000, LAST)),
-        Claim("Contexts: on the toss less than a learner that does not feel the wind: < 0 at 1000, 2000",
-              less(found, toss, "alone-toss-blind", 1000, 2000)),
-        Claim("... less than without a teacher", less(found, toss, "alone-toss", 1000, 2000)),
-        Claim("... and asks more in a strong wind than in a weak one",
+        Claim("Contexts: on the toss SGIM-IM has a smaller error than a learner to which the wind is hidden: < 0 at "
+              "1000, 2000", less(found, toss, "alone-toss-blind", 1000, 2000)),
+        Claim("... a smaller error than without a teacher", less(found, toss, "alone-toss", 1000, 2000)),
+        Claim("... and asks more often in a strong wind than in a weak wind",
               [at_most(0, more, "weak", toss, "strong", toss, form="+.0f")]),
     ]  # fmt: skip

@@ -1,13 +1,13 @@
-"""Make the pages in results/ and the README's section of results: fill templates with tables and numbers of the rows.
+"""Make the pages in results/ and the README's section of results from templates and from the tables of results.
 
-The text of each page is a template in experiments/pages/. Change the template, not the page. The rows are in
-results.csv and in the small tables beside it, which compare.py writes to --results. Intervals are bootstrapped with a
-fixed seed, so the same rows give the same pages. The script names missing rows.
+The text of each page is a template in experiments/pages/. Change the template, not the page. --results has the tables
+that compare.py writes, results.csv and smaller ones. Intervals are bootstrapped with a fixed seed, so equal tables give
+equal pages. The script lists runs that the tables lack.
 
 Examples:
   python experiments/claims.py                                  all pages, and the README
   python experiments/claims.py --only RESULTS                   one page
-  python experiments/claims.py --results mine --out mine        your own rows, into a folder of your own
+  python experiments/claims.py --results mine --out mine        pages of your own tables, into your own folder
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ BEGIN, END = "<!-- results: made by experiments/claims.py from experiments/pages
 
 
 def filled(name: str, found: Evidence, folder: Path) -> tuple[str, Page]:
-    """The text of a template with its tables and numbers, and the page that has made them."""
+    """The text of a template filled with tables and numbers, and the `Page` that has made them."""
     loader = jinja2.FileSystemLoader(TEMPLATES)
     environment = jinja2.Environment(loader=loader, undefined=jinja2.StrictUndefined, keep_trailing_newline=True)
     page = Page(found, folder)
@@ -45,7 +45,7 @@ def filled(name: str, found: Evidence, folder: Path) -> tuple[str, Page]:
 
 
 def into_readme(text: str, section: str) -> str:
-    """A README with its section of results made again.
+    """The ``text`` of a README with a new ``section`` of results.
 
     Raises:
         ResultsError: the README has no such section.
@@ -58,7 +58,7 @@ def into_readme(text: str, section: str) -> str:
 
 
 def _check_place(path: Path) -> None:
-    """Raise a ResultsError if the file at ``path`` is not one of our pages, so that it is not overwritten."""
+    """Raise a ResultsError if ``path`` is a file that this script has not made, and must not overwrite."""
     if path.is_file() and not path.read_bytes().startswith(MADE.encode()):
         raise ResultsError(
             f"{path} was not made by claims.py and is left as it is; move it away, or name another --out"
@@ -66,11 +66,11 @@ def _check_place(path: Path) -> None:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Make the pages. If the rows make no sense, the exit code is 2 and no page is changed."""
+    """Make the pages; if the tables are damaged, the exit code is 2 and no page is changed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     results = Path("results")
-    parser.add_argument("--results", type=Path, default=results, help="folder of the rows (default: %(default)s)")
-    where = "folder of the pages; the README changes only if it is %(default)s (default: %(default)s)"
+    parser.add_argument("--results", type=Path, default=results, help="folder of the tables (default: %(default)s)")
+    where = "folder of the pages; only with the default, the README changes, too (default: %(default)s)"
     parser.add_argument("--out", type=Path, default=results, help=where)
     parser.add_argument("--only", choices=PAGES, help="page to make (default: all)")
     options = parser.parse_args(argv)

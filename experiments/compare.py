@@ -1,11 +1,11 @@
 """Run the experiments, every variant with several seeds, and collect the results in tables.
 
-variants.py lists the variants. A run goes to OUT/VARIANT/seed-003. When it ends, each of its evaluations becomes rows
-of results.csv in RESULTS, one for each inverse model that a page shows. Requests of learners that ask are in asked.csv;
-tiles reached and goals chosen are in explored.csv. A variant of two experiments is run once; both get rows.
+variants.py lists the variants. A run is in OUT/VARIANT/seed-003. After the run, results.csv in RESULTS gets a row for
+each of its evaluations by each inverse model that a page shows. asked.csv gets the requests of learners that ask, and
+explored.csv the tiles reached and the goals chosen. A variant of two experiments is run once; both get rows.
 
-Start the same command again after Ctrl-C or a power cut, or with more seeds: runs in the tables are not repeated, and a
-run that was stopped goes on. If a run fails, the others go on.
+After Ctrl-C or a power cut, or for more seeds, start the command again: runs in the tables are not repeated, and
+stopped runs continue. If a run fails, the others continue.
 """
 
 from __future__ import annotations
@@ -38,21 +38,21 @@ EXAMPLES: Final = f"""experiments: {", ".join(EXPERIMENTS)}
 
 examples:
   python experiments/compare.py --dry-run                         list the runs that the pages still lack
-  python experiments/compare.py                                   make these runs, with the seeds of each page
+  python experiments/compare.py                                   make the runs that the pages still lack
   python experiments/compare.py learners large-space --seeds 0-2 --results mine
-  python experiments/compare.py ablations --only uniform-goals grid --results mine   all their rows, into mine/
+  python experiments/compare.py ablations --only uniform-goals grid --results mine   two variants, rows in mine/
   python experiments/compare.py --shard 3/20                      a part of the runs, see docs/clusters.md
-  python experiments/compare.py --verify 10 --lot 7               make ten rows again, drawn at random
+  python experiments/compare.py --verify 10 --lot 7               make ten random rows again, and compare
 
 Exit code: 0 all runs are in the tables, 1 some failed, 2 the request is wrong, 130 or 143 stopped by a signal.
 """
-# Experiments that measure the noise floor, which takes as long as everything else.
+# Experiments whose runs measure the noise floor. Measuring takes as long as the rest of a run.
 FLOORS: Final = ("learners", "letter", "forward-model")
 FLOOR_AT: Final = 5000
 RUN: Final = ["experiment", "variant", "seed", "movements", "answer"]
 NUMBERS: Final = ["error", "floor"]
-ROUNDING: Final = 1e-5  # relative; other processors round differently, and errors grow over thousands of movements
-Wanted = tuple[str, Config]  # an experiment, and a run whose rows it gets
+ROUNDING: Final = 1e-5  # relative difference that rounding on another processor may cause over thousands of movements
+Wanted = tuple[str, Config]  # name of an experiment, and settings of a run whose rows the experiment gets
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -94,9 +94,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def verify(wanted: Sequence[Wanted], table: pd.DataFrame, options: argparse.Namespace) -> int:
-    """Draw rows of the table at random, make each row again by a new run, and compare both rows.
+    """Draw rows of the table at random, make each row again by a new run, and compare old and new row.
 
-    The new run ends after the movements of the row and is evaluated only there, which changes nothing about learning.
+    The new run ends at the number of movements in the row and is evaluated only there; evaluations do not change
+    learning.
 
     Returns:
         0 if all rows are equal except for rounding, else 1.
@@ -126,7 +127,7 @@ def verify(wanted: Sequence[Wanted], table: pd.DataFrame, options: argparse.Name
 
 
 def compared(shipped: Row, now: Row) -> str:
-    """Compare two rows: "equal", "rounding" if they differ by rounding errors alone, or "DIFFERS"."""
+    """Verdict on two rows: "equal", "rounding" if they differ by rounding errors alone, or "DIFFERS"."""
     if {name: shipped[name] for name in RUN} != {name: now.get(name) for name in RUN}:
         return "DIFFERS"
     then, found = (np.array([row[name] for name in NUMBERS], dtype=np.float64) for row in (shipped, now))
@@ -139,10 +140,10 @@ def runs_of(experiments: Sequence[str], only: Sequence[str], seeds: Sequence[int
     """Pairs of experiment and run, seed by seed, so that every variant gets its first seeds early.
 
     Args:
-        experiments: names in ``EXPERIMENTS``.
+        experiments: names of experiments, as in ``EXPERIMENTS``.
         only: names of the variants to run; empty for all variants of the experiments.
         seeds: seeds of each variant; None for the seeds of its page.
-        out: folder of the runs; the subsets of ``make_subsets`` are in ``out/demonstrations``.
+        out: folder of the runs; ``out/demonstrations`` has the files of ``make_subsets``.
     """
     found = []
     for seed in sorted({*chain(*SEEDS.values())}) if seeds is None else seeds:
@@ -160,7 +161,7 @@ def runs_of(experiments: Sequence[str], only: Sequence[str], seeds: Sequence[int
 
 
 def last_rows(experiment: str, config: Config) -> set[tuple[Any, ...]]:
-    """Keys of the rows of a run's last evaluation; if the table has these rows, it has the earlier ones, too."""
+    """Keys of the rows of a run's last evaluation; a table that has these rows has all rows of the run."""
     answers = {own_answer(config) if answer == OWN else answer for answer in config.evaluated_by}
     answers.intersection_update(ANSWERS.get(experiment, ALIKE))
     return {(experiment, config.variant, config.seed, config.movements, answer) for answer in answers}
@@ -179,11 +180,11 @@ def collect(experiment: str, config: Config, results: Path) -> None:
         raise RunError(f"{run.path} has no evaluation after {config.movements} movements, though it ended")
     if name := SMALL_TABLES.get(experiment):
         merge(results, name, ROWS[name](config, run))
-    merge(results, FILE, rows)  # this comes last, because from now on the run counts as done
+    merge(results, FILE, rows)  # last, because with these rows the run counts as done
 
 
 def _run(configs: Sequence[Config], options: argparse.Namespace, on_end: Any = None) -> list[str]:
-    """Carry out runs; returns a message for each failure."""
+    """Carry out runs; returns error messages, one for each failed run."""
     make_subsets(options.out / "demonstrations", by_hand="by-hand" in options.experiments)
     return sweep(configs, options.processes, on_end=on_end)
 
@@ -208,7 +209,7 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--out", type=Path, default=Path("runs"), help="folder of the runs (default: %(default)s)")
     parser.add_argument("--results", type=Path, default=Path("results"), help=results)
     parser.add_argument(
-        "--verify", type=int, default=0, metavar="N", help="number of rows to draw at random and to make again"
+        "--verify", type=int, default=0, metavar="N", help="number of random rows to make again and to compare"
     )
     parser.add_argument("--lot", type=int, default=0, help="seed of the draw of --verify (default: %(default)s)")
     options = parser.parse_args(argv)

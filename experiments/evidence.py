@@ -1,8 +1,9 @@
-"""The rows as evidence: errors by seed, and the statistics over seeds that claims, tables and figures read.
+"""The evidence of the tables of results: errors by seed, and statistics over seeds for claims, tables and figures.
 
     found = Evidence.of(Path("results")); show(found.ratio("sgim-d", "random"))
-The name of a variant means its errors if `process` answers; "sgim-d-letter by paper" names another inverse model. Two
-names are compared on their common seeds, or as independent samples if they have no seed in common.
+A name is that of a variant, whose errors are those with the inverse model `process`; "sgim-d-letter by paper" names
+another inverse model. Two names, "ours" and "theirs", are compared on their common seeds. If no seed is common, they
+are compared as independent samples.
 """
 
 from __future__ import annotations
@@ -28,22 +29,22 @@ from sgimd_torch.views.statistics import (
 )
 from table import read_table
 
-LAST: Final = 5000  # number of movements in the life of a learner, as in the paper
-Level = float | None  # confidence of an interval; None if only the number is needed, which costs much less
+LAST: Final = 5000  # number of movements of a whole run, as in the paper
+Level = float | None  # confidence level of an interval; None: no interval, which takes much less time
 Statistic = Callable[..., Interval]  # function with a keyword ``level``
 
 
 class NotRun(LookupError):
-    """Runs or evaluations are missing; the message names them."""
+    """Exception: runs or evaluations are missing; the message names them."""
 
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """The rows of all experiments. Every method raises `NotRun` if fewer than two seeds have the rows that it needs.
+    """The tables of all experiments. Every method raises `NotRun` if fewer than two seeds have the rows that it needs.
 
     Args:
-        rows: error and floor by answer, variant, movements and seed.
-        explored, asked: small tables, by variant and seed.
+        rows: results.csv with the index answer, variant, movements and seed.
+        explored, asked: tables explored.csv and asked.csv, with the index variant and seed.
     """
 
     rows: pd.DataFrame
@@ -55,7 +56,7 @@ class Evidence:
         """The tables of a folder.
 
         Raises:
-            ResultsError: a table makes no sense.
+            ResultsError: a table is damaged.
         """
         key = ["answer", "variant", "movements", "seed"]
         rows = read_table(folder).drop_duplicates(key).set_index(key)[["error", "floor"]].sort_index()
@@ -63,21 +64,21 @@ class Evidence:
         return cls(rows, explored, asked)
 
     def at(self, name: str, movements: int = LAST, column: str = "error") -> pd.Series:
-        """Errors (m) by seed; if the column is "floor", noise floors (m) by seed."""
+        """Errors (m) by seed after a number of movements; noise floors (m) if the column is "floor"."""
         variant, _, answer = name.partition(" by ")
         place = (answer or "process", variant, movements)
         found = self.rows.loc[place, column].dropna() if place in self.rows.index else pd.Series(dtype=float)
         return _two_or_more(found, f"{name} at {movements}")
 
     def curve(self, name: str) -> pd.DataFrame:
-        """Errors (m) by seed and movements; a seed that lacks an evaluation of the others is left out."""
+        """Errors (m): a row for each seed, a column for each number of movements; incomplete seeds are left out."""
         variant, _, answer = name.partition(" by ")
         if (answer or "process", variant) not in self.rows.index:
             raise NotRun(name)
         return self.rows["error"].loc[answer or "process", variant].unstack("movements").dropna()
 
     def counts(self, table: str, name: str, column: str, teachers: Sequence[str] = ()) -> pd.Series:
-        """A column of a small table by seed, summed over ``teachers``, or over all teachers if none is named."""
+        """A column of explored.csv or asked.csv by seed, summed over ``teachers``, or over all if none is named."""
         rows: pd.DataFrame = getattr(self, table)
         variant = name.partition(" by ")[0]
         mine = rows[rows.index == variant].dropna(subset=column)
@@ -85,15 +86,15 @@ class Evidence:
         return _two_or_more(mine.groupby("seed")[column].sum(), f"{column} of {variant}")
 
     def error(self, name: str, at: int = LAST, *, level: Level = LEVEL) -> Interval:
-        """The interquartile mean of the error (m)."""
+        """The interquartile mean of the error (m) after ``at`` movements."""
         return _found(interquartile_mean, self.at(name, at), level=level)
 
     def difference(self, ours: str, theirs: str, at: int = LAST, *, level: Level = LEVEL) -> Interval:
-        """Our error minus theirs (m)."""
+        """Our error minus theirs (m), after ``at`` movements."""
         return self.less(self.at(ours, at), self.at(theirs, at), level=level)
 
     def ratio(self, ours: str, theirs: str, at: int = LAST, *, level: Level = LEVEL) -> Interval:
-        """Our error divided by theirs."""
+        """Our error divided by theirs, after ``at`` movements."""
         return self.over(self.at(ours, at), self.at(theirs, at), level=level)
 
     def growth(self, name: str, late: int, early: int, *, level: Level = LEVEL) -> Interval:
@@ -118,7 +119,7 @@ class Evidence:
         return _found(ratio, self.at(ours), self.at(theirs), level=level)
 
     def growth_ratio(self, ours: Sequence[str], theirs: Sequence[str], *, level: Level = LEVEL) -> Interval:
-        """The growth of our error, from the first to the second of our names, divided by the growth of theirs."""
+        """The growth of our error divided by the growth of theirs: growth from the first to the second of two names."""
 
         def times(*errors: Array) -> Array:
             small, large, their_small, their_large = map(interquartile_mean, errors)
@@ -127,7 +128,7 @@ class Evidence:
         return _found(times, *map(self.at, (*ours, *theirs)), level=level)
 
     def over_tasks(self, ours: Sequence[str], theirs: Sequence[str], at: int, *, level: Level = LEVEL) -> Interval:
-        """Our error divided by theirs, as interquartile mean over tasks; both sides have a name for each task."""
+        """The interquartile mean over tasks of our error divided by theirs; each side has one name for each task."""
 
         def mean(*drawn: Array) -> Array:
             pairs = zip(drawn[: len(ours)], drawn[len(ours) :], strict=True)
@@ -136,7 +137,7 @@ class Evidence:
         return _found(mean, *(self.at(name, at) for name in (*ours, *theirs)), level=level)
 
     def time_to_reach(self, ours: str, theirs: str, *, level: Level = LEVEL) -> Interval:
-        """Number of movements until our mean error falls to their last one; 2 ``LAST`` if it never does."""
+        """Number of movements after which our error is as small as their last error; 2 ``LAST`` if it never is."""
         curve = self.curve(ours)
         movements = curve.columns.to_numpy(np.float64)
 
@@ -147,26 +148,26 @@ class Evidence:
         return _found(time, curve, self.at(theirs), level=level)
 
     def count(self, table: str, name: str, column: str, *, level: Level = LEVEL) -> Interval:
-        """The interquartile mean of a column of a small table."""
+        """The interquartile mean of a column of explored.csv or asked.csv."""
         return _found(interquartile_mean, self.counts(table, name, column), level=level)
 
     def more_tiles(self, ours: str, theirs: str, *, level: Level = LEVEL) -> Interval:
-        """The number of tiles of the benchmark that we reached in a life, minus their number."""
+        """The number of benchmark tiles that our runs reach, minus the number that theirs reach."""
         return self.less(*(self.counts("explored", name, "tiles") for name in (ours, theirs)), level=level)
 
     def near_goals(self, name: str) -> pd.DataFrame:
-        """Two numbers by seed: ``goals`` that a learner chose, and goals among them that it can reach, ``near``."""
+        """By seed, the number of ``goals`` that a learner chose, and the number ``near`` of those within reach."""
         return pd.DataFrame({column: self.counts("explored", name, column) for column in ("goals", "near")})
 
     def near_share(self, name: str, *, level: Level = LEVEL) -> Interval:
-        """The share of chosen goals that can be reached, all seeds together."""
+        """The share of chosen goals that can be reached, over the goals of all seeds."""
         found = self.near_goals(name)
         return self.share(found["near"], found["goals"], level=level)
 
     def near_ratio(self, ours: str, theirs: str, *, level: Level = LEVEL) -> Interval:
-        """Our share of goals that can be reached divided by theirs, all seeds together.
+        """Our share of goals that can be reached divided by theirs, each over the goals of all seeds.
 
-        To avoid a division by zero, their learner gets one goal more, half of it within reach.
+        To avoid a division by zero, 0.5 is added to their goals that can be reached, and 1 to all their goals.
         """
 
         def times(ours: Array, theirs: Array) -> Array:
@@ -176,7 +177,7 @@ class Evidence:
         return _found(times, self.near_goals(ours), self.near_goals(theirs), level=level)
 
     def less(self, ours: pd.Series, theirs: pd.Series, *, level: Level = LEVEL) -> Interval:
-        """Our numbers minus theirs, both given by seed."""
+        """The interquartile mean of our numbers minus theirs, both given by seed."""
         ours, theirs, paired = _matched(ours, theirs)
 
         def difference(x: Array, y: Array) -> Array:
@@ -185,7 +186,7 @@ class Evidence:
         return _found(difference, ours, theirs, paired=paired, level=level)
 
     def over(self, ours: pd.Series, theirs: pd.Series, *, level: Level = LEVEL) -> Interval:
-        """Our numbers divided by theirs, both given by seed."""
+        """The interquartile mean of our numbers divided by that of theirs, both given by seed."""
         ours, theirs, paired = _matched(ours, theirs)
         return _found(_ratio, ours, theirs, paired=paired, level=level)
 
@@ -205,10 +206,10 @@ class Evidence:
 
 
 def shared(ours: pd.Series, theirs: pd.Series) -> tuple[pd.Series, pd.Series]:
-    """Both series, restricted to common seeds.
+    """Both series, restricted to their common seeds.
 
     Raises:
-        NotRun: fewer than two seeds are common.
+        NotRun: there are fewer than two common seeds.
     """
     seeds = ours.index.intersection(theirs.index)
     if len(seeds) < 2:
@@ -217,28 +218,28 @@ def shared(ours: pd.Series, theirs: pd.Series) -> tuple[pd.Series, pd.Series]:
 
 
 def movements_to_reach(movements: Array, errors: Array, level: Array | float) -> Array:
-    """Number of movements at which the error first falls to a level, on straight lines between evaluations.
+    """Number of movements at which the error first falls to a level; errors between evaluations are interpolated.
 
     Args:
-        movements: ``(n,)``, increasing.
-        errors: ``(..., n)`` m.
-        level: ``(...)`` m.
+        movements: ``(n,)`` numbers of movements at the evaluations, increasing.
+        errors: ``(..., n)`` errors (m) at the evaluations.
+        level: ``(...)`` level of the error (m).
 
     Returns:
-        ``(...)``, at least the first of ``movements``; inf if the level is never reached.
+        ``(...)`` numbers of movements, at least the first of ``movements``; inf if the level is never reached.
     """
     level = np.asarray(level, dtype=np.float64)[..., None]
     reached = errors <= level
     after = np.clip(reached.argmax(axis=-1, keepdims=True), 1, None)
     high, low = (np.take_along_axis(errors, after - step, axis=-1) for step in (1, 0))
     fall = np.where(high > low, high - low, 1.0)
-    share = np.clip((high - level) / fall, 0, 1)  # 0 if the first evaluation is low enough
+    share = np.clip((high - level) / fall, 0, 1)  # 0 if the error at the first evaluation is low enough
     found = movements[after - 1] + share * (movements[after] - movements[after - 1])
     return np.where(reached.any(axis=-1), found[..., 0], np.inf)
 
 
 def _matched(ours: pd.Series, theirs: pd.Series) -> tuple[pd.Series, pd.Series, bool]:
-    """Both series on their common seeds and True; if no seed is common, all of both series and False."""
+    """Both series on their common seeds, and True; if no seed is common, both whole series, and False."""
     paired = not ours.index.intersection(theirs.index).empty
     return *(shared(ours, theirs) if paired else (ours, theirs)), paired
 

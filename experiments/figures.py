@@ -1,11 +1,11 @@
-"""Draw the figures of the pages of results from results/results.csv alone. In all of them `process` answers.
+"""Draw the figures of the pages of results from results/results.csv. The inverse model is `process` in all of them.
 
   learning    error against movements, of learners with and without a teacher      (README, LEARNING)
   paper       the paper's five learners, in its task space and in the larger one    (RESULTS)
   gain        error after each step from random movements to practice               (GAIN)
-  curiosity   interest against uniform goals, wherever both were tried              (CURIOSITY)
+  curiosity   error with goals by interest, divided by the error with uniform goals (CURIOSITY)
 
-Lines are interquartile means over seeds; bands and bars are 95 % intervals. Figures without rows are named, not drawn.
+Points are interquartile means over seeds, with 95 % intervals. If a figure has no data, a message says so.
 
 Example:
   python experiments/figures.py
@@ -97,9 +97,9 @@ FIGURES: Final[dict[str, Callable[[Evidence], Figure]]] = {
 
 
 def curves(ax: Axes, found: Evidence, shown: Mapping[str, str]) -> None:
-    """Draw errors against movements, with intervals as bands; ``shown`` names one variant of each algorithm.
+    """Draw errors against movements, with intervals as bands; ``shown`` has a variant for each algorithm.
 
-    Movements are on a logarithmic axis, because learners differ most early.
+    The axis of movements is logarithmic, because learners differ most in the first movements.
     """
     ends: dict[str, float] = {}
     for algorithm, name in shown.items():
@@ -117,12 +117,12 @@ def curves(ax: Axes, found: Evidence, shown: Mapping[str, str]) -> None:
     ax.grid(alpha=0.3)
     height, gap = -np.inf, 0.06 * ax.get_ylim()[1]
     for algorithm, end in sorted(ends.items(), key=lambda each: each[1]):
-        height = max(end, height + gap)  # names must not overlap
+        height = max(end, height + gap)  # so that names do not overlap
         ax.text(1.1 * LAST, height, NAMES[algorithm], color=COLOURS[algorithm], va="center")
 
 
 def _rows(numbers: Mapping[str, Callable[[], Interval]], label: str, form: str = ".3f") -> Figure:
-    """A figure with a row for each number that has runs, from the top; a row is a point with its interval."""
+    """A figure with a row, a point with its interval, for each of the ``numbers`` that has runs."""
     shown: dict[str, Interval] = {}
     for name, number in numbers.items():
         try:
@@ -146,7 +146,7 @@ def _rows(numbers: Mapping[str, Callable[[], Interval]], label: str, form: str =
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Draw the figures that have rows; the exit code is 2 if the rows make no sense."""
+    """Draw the figures whose runs are in the tables; the exit code is 2 if a table is damaged."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--results", type=Path, default=Path("results"), help="folder of tables (default: %(default)s)")
     parser.add_argument(

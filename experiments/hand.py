@@ -1,9 +1,9 @@
-"""A script that leads the rod as a person does on the page of ``sgimd teach``, and makes ten lessons.
+"""A simulated hand that leads the rod as a person does on the page of ``sgimd teach``, and makes ten lessons.
 
     lessons = lessons_of_a_script()          # the experiment by-hand uses their demonstrations
-The script takes the rod by its tip, swings it to one side in one sweep, and releases it. A sweep is curved and has a
-bell-shaped speed. The hand trembles, and ends a few centimetres beside its aim. The script cuts pauses off, and the
-robot executes each lesson once.
+The hand takes the rod by its tip, swings the rod to one side in one sweep, and releases it. A sweep is curved and has a
+bell-shaped speed. The hand trembles, and a sweep ends a few centimetres beside its aim. Pauses before and after a sweep
+are cut off, and the robot executes each lesson once.
 """
 
 from __future__ import annotations
@@ -20,31 +20,31 @@ from sgimd_torch.teach.lessons import HandLesson, lesson_by_hand, moving
 
 LESSONS: Final = 10
 SEED: Final = 2014  # seed of the hand; all learners get the same lessons
-HEARD: Final = 0.05  # s, time between messages about the hand, as from a browser
+HEARD: Final = 0.05  # s, time between two positions of the hand, as from a browser
 LASTS: Final = (0.9, 1.4)  # s, duration of a sweep
 WAITS: Final = 0.3  # s, pause before and after a sweep
 REACHES: Final = (0.25, 0.7)  # m, distance from the base at the end of a sweep
 HEIGHTS: Final = (0.6, 0.8)  # m, height at the end of a sweep, which begins at .85 m
-BESIDE: Final = 0.03  # m, standard deviation of the end of a sweep
-ARCH: Final = 0.05  # m, standard deviation of the middle of a sweep
-TREMBLE: Final = 0.004  # m, standard deviation of the tremble at full speed; at rest a mouse does not tremble
+BESIDE: Final = 0.03  # m, standard deviation of the end of a sweep around its aim
+ARCH: Final = 0.05  # m, standard deviation of the middle of a sweep around its arc
+TREMBLE: Final = 0.004  # m, standard deviation of the tremor at full speed; at rest there is no tremor
 
 
 def sweep(tip: Array, end: Array, rng: np.random.Generator) -> Array:
     """``(n, 3)`` m, places of the hand every ``HEARD`` s, from ``tip`` around the base to ``end``."""
     lasts = rng.uniform(*LASTS)
     phase = np.clip((np.arange(0, lasts + 2 * WAITS, HEARD) - WAITS) / lasts, 0, 1)
-    share = (phase**3 * (10 - 15 * phase + 6 * phase**2))[:, None]  # minimum jerk, which has a bell-shaped speed
+    share = (phase**3 * (10 - 15 * phase + 6 * phase**2))[:, None]  # minimum jerk: bell-shaped speed
     way = _around(tip) + share * (_around(end) - _around(tip))
     turn, reach, height = way.T
     hand = np.stack([reach * np.sin(turn), reach * np.cos(turn), height], axis=1)
     hand += 4 * share * (1 - share) * rng.normal(0, ARCH, 3) + share * rng.normal(0, BESIDE, 3)
-    bell = (16 * phase**2 * (1 - phase) ** 2)[:, None]  # the speed of minimum jerk, 1 at its peak
+    bell = (16 * phase**2 * (1 - phase) ** 2)[:, None]  # speed of minimum jerk, relative to its peak
     return np.asarray(hand + bell * rng.normal(0, TREMBLE, hand.shape))
 
 
 def lead(leading: Leading, end: Array, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Lead the arm by its hand from its start to ``end``, and release it. Returns times and joints of the recording."""
+    """Lead the arm by its tip from the start to ``end``, and release it. Returns times and joints of the recording."""
     leading.home()
     leading.grab()
     leading.begin_recording()
@@ -57,12 +57,12 @@ def lead(leading: Leading, end: Array, rng: np.random.Generator) -> tuple[Array,
 
 
 def lessons_of_a_script() -> list[HandLesson]:
-    """Ten lessons on the rod, whose sweeps end on all sides of the base, near it and far from it."""
+    """Ten lessons on the rod. Their sweeps end on all sides of the base, near the base and far from it."""
     task = fishing_rod()
     leading, found = Leading(hand_led_of(task)), list[HandLesson]()
     for number in range(LESSONS):
         rng = stream(SEED, "hand", number)
-        turn = np.pi * (2 * (number * (3 - np.sqrt(5)) / 2 % 1) - 1)  # golden angle, so that no side comes twice
+        turn = np.pi * (2 * (number * (3 - np.sqrt(5)) / 2 % 1) - 1)  # golden angle: no two sweeps go to the same side
         near, far = REACHES
         reach, height = np.sqrt(rng.uniform(near**2, far**2)), rng.uniform(*HEIGHTS)
         end = np.array([reach * np.sin(turn), reach * np.cos(turn), height])
@@ -71,5 +71,5 @@ def lessons_of_a_script() -> list[HandLesson]:
 
 
 def _around(place: Array) -> Array:
-    """``(3,)`` turn (rad) around the base from straight ahead, distance (m) from its axis, and height (m)."""
+    """Cylindrical coordinates ``(3,)`` of a place: angle (rad) from straight ahead, radius (m), and height (m)."""
     return np.array([np.arctan2(place[0], place[1]), np.hypot(place[0], place[1]), place[2]])

@@ -2,11 +2,12 @@
 inverse kinematics", IEEE Transactions on Autonomous Mental Development 2(3).
 
 At first the learner knows one movement, home, which is the middle of Pi. Goals lie on straight paths through T. For
-each goal the learner makes the movement that its estimate gives, plus a variation, an affine function of the goal that
-stays the same along a path. The estimate learns from these movements alone. A movement counts more if it led towards
-the goal, and far for its size. So the estimate learns one family of the many movements that reach a place.
+each goal the learner makes the movement that its estimate gives, plus a variation. The variation is an affine function
+of the goal, drawn once for each path. The estimate learns from these movements alone. A movement gets a larger weight
+if its outcome moved towards the goal, and farther relative to the change of theta. So the estimate learns one of the
+many families of movements that reach a place.
     sgimd run --algorithm experiments.home_babbling:home_babbling
-Deviation: the estimate is a local affine regression, not a global one; a posture is a movement here.
+Deviation: the estimate is a local affine regression, not a global one. Theta takes the place of the posture.
 """
 
 from __future__ import annotations
@@ -22,14 +23,14 @@ from sgimd_torch.parts import Problem, Strategy
 from sgimd_torch.spaces import Array, Attempt, Move
 
 HOMEWARD: Final = 0.1  # share of paths that begin with the movement home
-NEAREST: Final = 20  # outcomes around a goal that enter the estimate
-RIDGE: Final = 0.1  # number of further exemplars in the estimate, which are all home and have the mean weight
+NEAREST: Final = 20  # number of nearest outcomes around a goal in the local regression
+RIDGE: Final = 0.1  # weight of home in the local regression, relative to the mean weight of an exemplar
 ORIGIN: Final = "home-babbling"
 TINY: Final = np.finfo(float).tiny
 
 
 class HomeBabbling(Strategy):
-    """A path of goals in each attempt.
+    """A strategy that follows one path of goals in each attempt.
 
     Args:
         problem: learning problem; its memory is empty at the start.
@@ -44,7 +45,7 @@ class HomeBabbling(Strategy):
         self.policies, self.outcomes, self.memory = problem.policies, problem.outcomes, problem.memory
         self.steps, self.sd = steps, sd
         self.home = (self.policies.low + self.policies.high) / 2
-        self._from: Array | None = None  # the last goal; None if the next path begins at home
+        self._from: Array | None = None  # last goal; None: the next path begins at home
         self._weights: list[float] = []  # weight of each exemplar
 
     def attempt(self, context: Array) -> Attempt:
@@ -79,10 +80,12 @@ class HomeBabbling(Strategy):
 
 
 def _weight(goal: Array, outcome: Array, theta: Array) -> float:
-    """Weight of a movement: its directness times its distance, divided by its size.
+    """Weight of a movement: how well its outcome moved in the goal's direction, times distance, divided by size.
 
     Args:
-        goal, outcome, theta: changes since the movement before, relative to the sides of T or Pi.
+        goal: change of the goal since the movement before, relative to the sides of T.
+        outcome: change of the outcome since the movement before, relative to the sides of T.
+        theta: change of theta since the movement before, relative to the sides of Pi.
     """
     length, size = np.linalg.norm(outcome), np.linalg.norm(theta)
     straight = goal @ outcome / max(np.linalg.norm(goal) * length, TINY)
@@ -90,16 +93,16 @@ def _weight(goal: Array, outcome: Array, theta: Array) -> float:
 
 
 def home_babbling(environment: Environment, seed: int, *, steps: int = 10, sd: float = 0.1) -> Learner:
-    """Goal babbling from home. In evaluations `LocalProcess` answers, as for other learners.
+    """Goal babbling from home. In evaluations `LocalProcess` answers, as for the other learners.
 
     Args:
-        environment: robot, which is not executed here.
-        seed: number from which the random stream of the learner comes.
+        environment: robot and world; its ``execute`` is not called.
+        seed: seed of the learner's random stream.
         steps: number of movements on a path.
         sd: standard deviation of the variations, relative to the sides of Pi.
 
     Raises:
-        ValueError: the environment has contexts, and a path cannot lead from one context to another.
+        ValueError: the environment has contexts; a path of goals would lead through several contexts.
     """
     if environment.contexts.dim:
         raise ValueError(f"home babbling knows one context only, got contexts of dim {environment.contexts.dim}")

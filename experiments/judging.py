@@ -1,8 +1,9 @@
-"""Verdicts on claims, which have parts with bars; one correction serves all claims of a page.
+"""Verdicts on claims: a claim has parts, and each part is a number with a bar, the bound that the number must keep.
 
     judge([Claim("SGIM-D halves Random's error", [at_most(0.5, found.ratio, "sgim-d", "random")])])
-A part clears its bar only if its whole interval does. A claim of several parts holds if each part holds, which needs
-no correction. It fails if one part fails at a confidence corrected for the number of parts. Else the claim is open.
+A part holds if its whole interval is on the right side of the bar. A claim holds if all its parts hold; this needs no
+correction for their number. A claim fails if one part fails at a level corrected for the number of parts. All other
+claims are open. Verdicts on several claims, such as all claims of a page, are corrected jointly.
 """
 
 from __future__ import annotations
@@ -26,8 +27,8 @@ class Part(NamedTuple):
     Args:
         measured: function of a confidence ``level`` that returns the number with its interval.
         bar: upper bound of the number; lower bound if ``least`` is true.
-        least: true if the claim says that the number is at least the bar.
-        margin: length of the interval that may lie beyond the bar if the part holds.
+        least: whether the bar is a lower bound.
+        margin: distance beyond the bar that the interval may reach although the part holds.
         name: name of the part, if a claim has several parts.
         form: format of the number.
     """
@@ -41,20 +42,20 @@ class Part(NamedTuple):
 
     @property
     def above(self) -> float:
-        """The distance from the bar to the number, positive if the number is on the wrong side."""
+        """The distance from the bar to the number, positive on the wrong side of the bar."""
         return _above(self, None)[0]
 
     def holds(self, level: float) -> bool:
-        """Whether the number clears the bar, and its interval clears the bar except for the margin."""
+        """Whether number and interval are on the right side of the bar, the interval except for the margin."""
         return self.above <= 0 and _above(self, level)[2] <= self.margin
 
     def fails(self, level: float) -> bool:
-        """Whether the whole interval is on the wrong side."""
+        """Whether the whole interval is on the wrong side of the bar."""
         return self.above > 0 and _above(self, level)[1] > 0
 
 
 class Claim(NamedTuple):
-    """A claim: ``text`` has its schedules and bar, all ``parts`` must hold, ``note`` is a sentence on the result."""
+    """A claim: ``text`` with the bar, ``parts`` that must all hold, and ``note``, a sentence on the result."""
 
     text: str
     parts: Sequence[Part]
@@ -62,7 +63,7 @@ class Claim(NamedTuple):
 
 
 class Verdict(NamedTuple):
-    """A verdict; ``number`` belongs to the worst part, farthest on the wrong side, and has a 95 % interval."""
+    """A verdict; ``number`` is that of the part farthest on the wrong side of its bar, with a 95 % interval."""
 
     claim: str
     number: str
@@ -70,13 +71,13 @@ class Verdict(NamedTuple):
 
 
 def judge(claims: Sequence[Claim]) -> list[Verdict]:
-    """Verdicts on claims, corrected together by Holm's method: the chance that any of them is wrong is 5 % at most.
+    """Verdicts on claims, corrected jointly by Holm's method: the probability of any wrong verdict is at most 5 %.
 
-    Intervals of few seeds are too narrow. If n paired differences all have one sign, their bootstrap interval excludes
-    0 at any level. By chance alone they all have one sign with probability 2^(1 - n).
+    With few seeds, bootstrap intervals are too narrow. If n paired differences have equal signs, their interval
+    excludes 0 at any level, although n signs are equal by chance with probability 2^(1 - n).
 
     Raises:
-        ValueError: errors have no ratio, for example because they are 0.
+        ValueError: a number cannot be computed, for example a ratio of errors that are 0.
     """
     run = {number: claim for number, claim in enumerate(claims) if _was_run(claim)}
     standing = holm(run, lambda number, level: _verdict(run[number], level) != OPEN)
@@ -104,13 +105,13 @@ def at_least(
 
 @cache
 def _above(part: Part, level: Level) -> tuple[float, float, float]:
-    """The number of a part and its interval, as distances from the bar; a distance above 0 is on the wrong side."""
+    """Number, low and high end of a part, as distances from its bar; a distance above 0 is on the wrong side."""
     value, low, high = (each - part.bar for each in part.measured(level=level))
     return (-value, -high, -low) if part.least else (value, low, high)
 
 
 def _verdict(claim: Claim, level: float) -> str:
-    # The worst part comes first, so that a claim of many parts that does not hold costs few intervals.
+    # The worst part comes first: if it does not hold, the intervals of the other parts need not be computed.
     worst = sorted(claim.parts, key=lambda part: -part.above)
     if all(part.holds(level) for part in worst):
         return HOLDS

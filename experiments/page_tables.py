@@ -1,4 +1,4 @@
-"""The tables of the pages of results, in Markdown, and the numbers that their text quotes.
+"""The tables of the pages of results, in Markdown, and the numbers quoted in the text of these pages.
 
 page = Page(found, Path("results")); page.suite(); page.error("sgim-d")
 """
@@ -22,7 +22,7 @@ from variants import ARMS, EXPERIMENTS, REFINING, ROBOTS, SPARSE, SUITE, TEACHER
 SETTINGS: Final = (*ROBOTS, *TEACHERS)
 VARIANTS: Final = {name for variants in EXPERIMENTS.values() for name in variants}
 MISSING_CELL: Final = "–"
-# Variants of each rival: without a teacher, shown one demonstration every 30 movements, and shown all at the start.
+# Three variants of each rival: without a teacher, with a demonstration every 30 movements, with all at the start.
 RIVALS: Final[Mapping[str, tuple[str, str, str]]] = {
     "practice": ("practice.rod", "practice-taught-every-30.rod", "practice-taught.rod"),
     "SAGG-RIAC; SGIM-D": ("sagg-riac.rod", "sgim-d.rod", "sgim-d-once.rod"),
@@ -39,7 +39,7 @@ RIVALS: Final[Mapping[str, tuple[str, str, str]]] = {
     "MAP-Elites, from the middle": ("middle-map-elites.rod", "", ""),
     "Goal babbling from home": ("home-babbling.rod", "", ""),
 }
-# Steps from random movements to practice, each added to the step before; then learners that have the same teacher.
+# Steps from random movements to the algorithm practice, each added to the step before.
 GAIN: Final[Mapping[str, str]] = {
     "random movements": RANDOM,
     "the standard baseline": UNIFORM,
@@ -57,7 +57,7 @@ TAUGHT: Final[Mapping[str, str]] = {
     "SGIM-D, at the start": "sgim-d-once",
     "`practice`, at the start": "practice-taught",
 }
-# Pairs of learners with and without an idea: untaught pairs first, then taught pairs.
+# For each idea, pairs of learners with and without it: first the pair without a teacher, then the pair with a teacher.
 IDEAS: Final = {
     "interest in the place of uniform goals": (("sagg-riac", "sagg-riac-uniform"), ("sgim-d", "sgim-d-uniform")),
     "practice in the place of goal babbling": (("practice", "sagg-riac"), ("practice-taught", "sgim-d")),
@@ -72,7 +72,7 @@ IDEAS: Final = {
 
 
 def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table of the rows that have a number; "Not run." if there are none."""
+    """A table of the rows that have a number; the text "Not run." if no row has a number."""
     known = [row for row in rows if any(cell not in (MISSING_CELL, "") for cell in row[1:])]
     if not known:
         return "Not run."
@@ -82,13 +82,13 @@ def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 @dataclass
 class Page:
-    """The tables and numbers of one page. ``at`` is a number of movements. A number without runs is a dash.
+    """The tables and numbers of one page. Numbers are those after ``at`` movements; a number without runs is a dash.
 
     Args:
-        found: rows of the experiments.
-        folder: folder of the tables.
-        missing: names of claims and numbers without runs; the list grows while the page is made.
-        verdicts: verdicts on the claims that have runs; this list grows, too.
+        found: evidence of the experiments.
+        folder: folder of the tables of results.
+        missing: names of claims and numbers without runs; the page adds to this list while it is made.
+        verdicts: verdicts on the claims that have runs; the page adds to this list, too.
     """
 
     found: Evidence
@@ -97,7 +97,7 @@ class Page:
     verdicts: list[Verdict] = field(default_factory=list)
 
     def error(self, name: str, at: int = LAST, form: str = ".3f", *, between: bool = False) -> str:
-        """The error (m); if ``between``, its interval, too."""
+        """The error (m), with its interval if ``between``."""
         return self.cell(self.found.error, name, at, form=form, between=between)
 
     def errors(self, name: str, times: Sequence[int], form: str = ".3f", *, between: bool = False) -> list[str]:
@@ -113,13 +113,13 @@ class Page:
         return self.cell(self.found.ratio, ours, theirs, at, form=".2f", between=True)
 
     def near(self, name: str) -> str:
-        """The share of the goals chosen by all seeds together that can be reached: ``43.4 %``."""
+        """The share of chosen goals that can be reached, over the goals of all seeds: ``43.4 %``."""
         return self.cell(self.found.near_share, name, form=".1%").replace("%", " %")
 
     def cell(
         self, statistic: Statistic, *of: object, form: str = ".3f", between: bool = False, bold: bool = False
     ) -> str:
-        """A number; if ``between``, its interval, too. With ``bold``, a number whose interval excludes 1 is bold."""
+        """A number, with its interval if ``between``. If ``bold``, a number whose interval excludes 1 is bold."""
         try:
             found = statistic(*of) if between else statistic(*of, level=None)
         except NotRun as missing:
@@ -135,7 +135,7 @@ class Page:
         return markdown(("claim", "number [95 %]", "verdict"), rows)
 
     def paper(self) -> str:
-        """A row for each of the paper's claims: verdicts on the paper's letter and on our learners, judged together."""
+        """A row for each claim of the paper, with two verdicts: on learners by the letter of the paper, and on ours."""
         letter, ours = paper(self.found, letter=True), paper(self.found, letter=False)
         verdicts = self.judged([*letter, *ours])
         cells = [
@@ -145,14 +145,14 @@ class Page:
         return markdown(("claim", "to the letter, by eq. (9)", "our SGIM-D, by `process`", "in a sentence"), cells)
 
     def judged(self, claims: Sequence[Claim]) -> list[Verdict]:
-        """A verdict for each claim."""
+        """A verdict on each claim."""
         verdicts = judge(claims)
         self.missing += [each.claim for each in verdicts if each.verdict == MISSING]
         self.verdicts += [each for each in verdicts if each.verdict != MISSING]
         return verdicts
 
     def rivals(self) -> str:
-        """Errors after 1000 and 5000 movements, of each rival with each schedule of its teacher."""
+        """Errors of each rival after 1000 and 5000 movements: without a teacher, and with each teaching schedule."""
         rows = [
             [label, *(", ".join(self.errors(name, (1000, LAST))) if name else MISSING_CELL for name in names)]
             for label, names in RIVALS.items()
@@ -161,14 +161,14 @@ class Page:
         return markdown(head, rows)
 
     def answers(self) -> str:
-        """Errors after 5000 movements with the answers of three inverse models."""
+        """Errors after 5000 movements if each of three inverse models answers."""
         names = ("practice-taught", "practice-uniform", "sgim-d", "uniform-nearest-taught", "cma-mae", "cma-mae-taught")
         by = ("nearest", "linear", "process")
         rows = [[f"`{name}`", *(self.error(f"{name}.rod by {answer}") for answer in by)] for name in names]
         return markdown(("memory of", "nearest", "`LocallyLinear`", "`process`"), rows)
 
     def suite(self, at: int = 1000) -> str:
-        """Errors divided by the error of random movements, on each task, then as interquartile mean over tasks."""
+        """Errors divided by the error of random movements: on each task, and as interquartile mean over tasks."""
         learners, every = ("practice", UNIFORM, "map-elites"), (*SUITE, *SPARSE)
         known = {name: [task for task in every if f"{name}.{task}" in VARIANTS] for name in learners}
         rows = [
@@ -179,7 +179,7 @@ class Page:
         return markdown(("task", *learners), rows)
 
     def gain(self) -> str:
-        """Errors at each step from random movements to practice, then errors of learners with the same teacher."""
+        """Errors at each step from random movements to practice, and of three learners with each teaching schedule."""
         rows = []
         for step, name in {**GAIN, **TAUGHT}.items():
             on_suite = all(f"{name}.{task}" in VARIANTS for task in SUITE)
@@ -198,7 +198,7 @@ class Page:
         return markdown(("change", "difference to SGIM-D at 5000 (m)"), rows)
 
     def steps(self) -> str:
-        """Errors at each step from the paper's letter to our defaults, in the small and in the large T."""
+        """Errors at each step from the letter of the paper to our defaults, in the small and in the large T."""
         rows = []
         both = [[f"sgim-d-letter{end}", *EXPERIMENTS[f"ladder{end}"], f"sgim-d{end}"] for end in ("", "-large")]
         for name, large in zip(*both, strict=True):
@@ -207,7 +207,7 @@ class Page:
         return markdown(("step", "T, by its own answer", "T, by `process`", "large T, by `process`"), rows)
 
     def models(self) -> str:
-        """Errors (m) of learners with and without a forward model, by their own answers and, at the end, `process`."""
+        """Errors (m) of learners with and without a forward model; in the last column `process` answers for all."""
         ends = {"": (1000, LAST), **{f"-{arm.removeprefix('planar-')}": (2000,) for arm in ARMS}}
         rows = []
         for name, line in REFINING.items():
@@ -218,9 +218,9 @@ class Page:
         return markdown(head, rows)
 
     def asking(self) -> str:
-        """Errors on the rod, the best first, of learners that ask and of others; numbers of demonstrations shown."""
+        """Errors on the rod, and numbers of demonstrations, of learners that ask and of others; the best come first."""
         names = [name for name in EXPERIMENTS["asking"] if "toss" not in name]
-        names.remove("sgim-acts-3")  # this name means the learner sgim-im
+        names.remove("sgim-acts-3")  # another name of the variant sgim-im
         rows = []
         for name in sorted(names, key=lambda name: self.error(name, LAST, ".9f")):
             shown = "0" if name == "alone" else "all"
@@ -230,9 +230,9 @@ class Page:
         return markdown(("learner", "1000", "5000", "shown"), rows)
 
     def settings(self, at: int = 2000) -> str:
-        """The error with an idea divided by that without the idea, in each setting; bold if the interval excludes 1.
+        """The error with an idea divided by the error without it, in each setting; bold if the interval excludes 1.
 
-        If a learner has no variant in a setting, it learns there as in the setting "as-it-is".
+        A learner without a variant for a setting does not depend on this setting; "as-it-is" is then its variant.
         """
 
         def cell(setting: str, *pair: str) -> str:
@@ -259,7 +259,10 @@ class Page:
         return markdown((head, *map(str, times)), rows)
 
     def tuned(self) -> str:
-        """Errors (m) of each rival with its default and its best setting in the first round; first and later seeds."""
+        """Errors (m) of each rival with its default setting and with the best setting of the first round.
+
+        One column has the seeds of the first round, the other has later seeds.
+        """
         table = read_table(self.folder, "rivals.csv")
         first, later = (
             half.groupby(["rival", "setting"])[["linear", "process"]].mean()

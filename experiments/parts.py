@@ -1,6 +1,6 @@
-"""Parts that experiments need and the library lacks: MAP-Elites from the middle of Pi, and a toss without a context.
+"""Parts that only the experiments need: MAP-Elites from the middle of Pi, and a toss without a context.
 
-sgimd run --algorithm experiments.parts:map_elites_middle         in the folder above this one
+sgimd run --algorithm experiments.parts:map_elites_middle         # in the root folder of the repository
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from sgimd_torch.spaces import Array, Box
 
 
 def map_elites_middle(environment: Environment, seed: int) -> Learner:
-    """MAP-Elites with first movements around the middle of Pi, wider variations, and cells of twice the side."""
+    """MAP-Elites that begins around the middle of Pi, with wider variations, and with cells of twice the side."""
 
     def emitters(archive: GridArchive, rng: np.random.Generator) -> list[GaussianEmitter]:
         dim = environment.policies.dim
@@ -35,7 +35,7 @@ def map_elites_middle(environment: Environment, seed: int) -> Learner:
 
 
 class BlindToss:
-    """The toss without a context: each movement meets a wind of its own, drawn from the same range."""
+    """The toss with a hidden wind: there is no context, and each movement draws a wind from the range of the toss."""
 
     def __init__(self) -> None:
         self._toss = toss()
@@ -44,7 +44,7 @@ class BlindToss:
         self.outcome_noise = self._toss.outcome_noise
 
     def observe(self, rng: np.random.Generator) -> Array:
-        """``(0,)``, an empty context."""
+        """The empty context, ``(0,)``."""
         return np.zeros(0)
 
     def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
@@ -53,6 +53,6 @@ class BlindToss:
 
 
 def blind_toss() -> Task:
-    """The task of a toss whose wind is not felt, with the goals of the toss; it shows what a context is worth."""
+    """The task of the toss with a hidden wind and the goals of the toss; it shows what knowing the context is worth."""
     goals = toy_benchmark(toss(), 0.4)
     return Task(BlindToss(), lambda: replace(goals, environment=BlindToss.__name__))

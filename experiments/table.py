@@ -2,7 +2,7 @@
 
     table = read_table(Path("results")); table[table.experiment == "learners"]
     merge(Path("results"), "results.csv", result_rows("learners", config, run))
-If a row is made again from the same run, it equals the old one, byte for byte. Small tables hold further numbers.
+A row that is made again from the same run is equal, byte for byte. explored.csv and asked.csv have further numbers.
 """
 
 from __future__ import annotations
@@ -28,19 +28,19 @@ from variants import ALIKE, ANSWERS
 Row = dict[str, Any]
 FILE: Final = "results.csv"
 _ASKED: Final = ("requests", "shown", "late", "late_own", "strong", "weak")
-# Two facts of each table: how many columns are its key, and all columns, the key first. No two rows share a key.
+# Of each table: the number of columns that form its key, and all columns, the key first. Keys of rows are unique.
 TABLES: Final[dict[str, tuple[int, tuple[str, ...]]]] = {
     FILE: (6, ("experiment", "variant", "task", "seed", "movements", "answer", "error", "floor")),
     "explored.csv": (2, ("variant", "seed", "tiles", "goals", "near")),
     "asked.csv": (3, ("variant", "seed", "teacher", *_ASKED)),
     "rivals.csv": (4, ("rival", "setting", "seed", "movements", "linear", "process")),
 }
-TYPES: Final = {  # types of columns; all other columns have floats, whose empty fields are NaN
+TYPES: Final = {  # types of columns; all other columns have floats, and an empty field is NaN
     **dict.fromkeys(("experiment", "variant", "task", "answer", "teacher", "rival", "setting"), "str"),
     **dict.fromkeys(("seed", "movements", "tiles", *_ASKED), "int64"),
-    **dict.fromkeys(("goals", "near"), "Int64"),  # fields may be empty
+    **dict.fromkeys(("goals", "near"), "Int64"),  # with empty fields
 }
-LATE: Final = 1000  # number of movements after which a learner is expected to know whom to ask
+LATE: Final = 1000  # number of movements after which requests count as late: the learner should know whom to ask
 CORNER: Final = -1.0  # m, least x and y of the tiles of the rod's benchmark
 NEAR: Final = 1.5  # m, distance from the base; goals farther away cannot be reached
 
@@ -53,14 +53,14 @@ def read_table(folder: Path, name: str = FILE) -> pd.DataFrame:
     """The table of this name in the folder; an empty table if there is no such file.
 
     Raises:
-        ResultsError: the file is another table, or one of its rows makes no sense.
+        ResultsError: the file is another table, or one of its rows is damaged.
         OSError: the file cannot be read.
     """
     path, (n_key, columns) = folder / name, TABLES[name]
     types = {column: TYPES.get(column, "float64") for column in columns}
     if not path.exists():
         return pd.DataFrame({column: pd.Series(dtype=kind) for column, kind in types.items()})
-    # Read by Python: another parser may change the last digit.
+    # Python's float() reads the numbers, because the parser of pandas may change the last digit.
     exact = {column: _number for column, kind in types.items() if kind in ("float64", "Int64")}
     others = {column: kind for column, kind in types.items() if column not in exact}
     try:
@@ -96,14 +96,14 @@ def merge(folder: Path, name: str, rows: Sequence[Row]) -> None:
 
 
 def write_table(folder: Path, name: str, table: pd.DataFrame) -> None:
-    """Replace a table. Numbers read back exactly; NaN is left empty."""
+    """Replace a table. ``read_table`` gets equal numbers; NaN is an empty field."""
     write_text(folder / name, table.to_csv(index=False, lineterminator="\n"))
 
 
 def result_rows(experiment: str, config: Config, run: Run) -> list[Row]:
     """Rows of results.csv: one for each evaluation of a finished run by each inverse model that pages show.
 
-    In rows of the learner's own inverse model, ``answer`` is the name of that model in the catalogue.
+    For the learner's own inverse model, the column ``answer`` has its name in the catalogue.
     """
     rows: list[Row] = []
     key = {"experiment": experiment, "variant": config.variant, "task": task_name(config), "seed": config.seed}
@@ -117,14 +117,14 @@ def result_rows(experiment: str, config: Config, run: Run) -> list[Row]:
 
 
 def own_answer(config: Config) -> str:
-    """The name of a learner's inverse model; for practice `process`, which it fits to effective movements."""
+    """The name of a learner's inverse model in the catalogue; practice has `process`, fitted to effective movements."""
     return str(config.values.get("inverse", "process")).replace("among-effects", "process")
 
 
 def answers_of(experiment: str, config: Config) -> tuple[str, ...]:
-    """The inverse models that answer in the evaluations of a run: first the run's own, then others that pages show.
+    """Names of the inverse models in the evaluations of a run: first the run's own, then others that pages show.
 
-    A forward model and eq. (9) answer only for learners that learn with them.
+    A forward model and eq. (9) answer only for learners that also learn with them.
     """
     others = {"process", "linear", "nearest"}.intersection(ANSWERS.get(experiment, ALIKE)) - {own_answer(config)}
     return (OWN, *sorted(others))
@@ -139,8 +139,8 @@ def task_name(config: Config) -> str:
 
 
 def explored_rows(config: Config, run: Run) -> list[Row]:
-    """The row of explored.csv: tiles of the benchmark that were reached, goals that the learner chose itself, and how
-    many of these goals can be reached."""
+    """The row of explored.csv: numbers of benchmark tiles reached, of goals chosen by the learner, and of goals among
+    them that can be reached."""
     goals = run.chosen_goals()
     benchmark = benchmark_of(task_of(Config()), config.benchmark)[0]
     tiles, near = tiles_reached(run.outcomes, benchmark), int((np.linalg.norm(goals, axis=1) <= NEAR).sum())
@@ -151,7 +151,7 @@ def asked_rows(config: Config, run: Run) -> list[Row]:
     """Rows of asked.csv: requests to each teacher that could be asked; none for a learner that does not ask.
 
     ``late`` counts requests from movement 1000 on, ``late_own`` late requests in the teacher's half of T. ``strong``
-    counts requests whose first context is in the outer third of its range, ``weak`` those in the inner third.
+    and ``weak`` count requests in which the first dimension of the context is in the outer or inner third of its range.
     """
     if config.teaching != "teachers":
         return []
@@ -189,7 +189,7 @@ def _number(text: str) -> float:
 
 
 def tiles_reached(outcomes: Array, benchmark: Benchmark) -> int:
-    """The number of tiles of the benchmark that hold one or more ``outcomes``; each goal has a tile.
+    """The number of benchmark tiles that contain one or more ``outcomes``; each goal has a tile.
 
     Args:
         outcomes: ``(n, 2)`` m, NaN if the robot was at rest.

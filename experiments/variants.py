@@ -1,8 +1,8 @@
-"""Every experiment as data: the line of each variant has its differences from the defaults of ``sgimd run``.
+"""Every experiment as data: each variant has the options in which it differs from the defaults of ``sgimd run``.
 
-Section 6 of Nguyen & Oudeyer (2014) comes first, then further experiments. A variant of SGIM-D changes one option.
+Section 6 of Nguyen & Oudeyer (2014) comes first, then further experiments.
     EXPERIMENTS["ablations"]["uniform-goals"]        # {"algorithm": "sgim-d", "goals": "uniform"}
-A variant of two experiments has the same line in both. It is run once, and both experiments get its rows.
+A variant of two experiments has equal options in both. It is run once, and both experiments get its rows.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ ARMS: Final = ("planar-arm-7", "planar-arm-50")
 SWIMMERS: Final = ("random", "sagg-riac", "sgim-d")
 SGIM_D: Final[Variant] = {"algorithm": "sgim-d"}
 SAGG_RIAC: Final[Variant] = {"algorithm": "sagg-riac"}
-# Practice with goals anywhere in T and without a search for effects. On the rod a taught `practice` learns alike.
+# The algorithm practice with uniform goals and without a search for effects. Taught on the rod, a learner with these
+# options makes the same movements as the default `practice-taught`.
 UNIFORM_PRACTICE: Final[Variant] = {
     "algorithm": "practice",
     "goals": "uniform",
@@ -33,8 +34,9 @@ UNIFORM_PRACTICE: Final[Variant] = {
 }
 SPARSE: Final = ("puck", "fetch")  # tasks where most movements do nothing
 SUITE: Final = {task: suited for task, suited in TASKS.items() if task not in SPARSE}
-# Steps from the paper to our defaults, one change at a time: name, options before, options after. The paper gives no
-# number for the budget and for g_max. A budget of 60 movements is more than fits between two demonstrations.
+# Steps from the letter of the paper to our defaults, one change at a time: name, options before, options after. The
+# paper gives no numbers for the budget of a goal and for g_max. A budget of 60 movements, more than the 30 between two
+# demonstrations, sets no limit.
 STEPS: Final[tuple[tuple[str, Variant, Variant], ...]] = (
     ("inverse", {"inverse": "paper"}, {"inverse": "linear"}),
     ("simplex", {"search": "nelder-mead-complete"}, {"search": "nelder-mead-exact"}),
@@ -47,9 +49,9 @@ STEPS: Final[tuple[tuple[str, Variant, Variant], ...]] = (
     ("proof", {"inverse": "linear"}, {"inverse": "process"}),  # the last step leads to our defaults
 )
 LETTER: Final[Variant] = {option: value for _, was, _ in reversed(STEPS) for option, value in was.items()}
-INVERSE: Final[Variant] = {"inverse": "paper"}  # the paper's letter for learners without goals
-# The inverse models whose answers a page shows. `process` answers for every learner. Others answer for some learners,
-# too: eq. (9) for the paper's letter, `linear` for a step of the ladder, a forward model for learners that train it.
+INVERSE: Final[Variant] = {"inverse": "paper"}  # the letter of the paper for learners without goals
+# Inverse models whose errors a page shows: `process` for every learner, and further ones for some learners. These are
+# eq. (9) for the letter of the paper, `linear` for a step of the ladder, and a forward model where one is trained.
 ALIKE: Final = ("process",)
 ANSWERS: Final[dict[str, tuple[str, ...]]] = {
     **dict.fromkeys(("letter", "large-space"), (*ALIKE, "paper")),
@@ -60,25 +62,25 @@ ANSWERS: Final[dict[str, tuple[str, ...]]] = {
     "learning": (*ALIKE, "linear", "nearest", "model"),
     "suite": (*ALIKE, "linear", "nearest"),
 }
-# The table besides results.csv that gets rows from the runs of an experiment.
+# The second table, beside results.csv, that gets rows from the runs of an experiment.
 SMALL_TABLES: Final = {"asking": "asked.csv", **dict.fromkeys(("learners", "letter", "large-space"), "explored.csv")}
 LARGE: Final[Variant] = {"environment.task_space": 100.0}
-BASELINE: Final[Variant] = {"goals": "uniform", "inverse": "nearest", "search": "perturb"}  # the field's standard
+BASELINE: Final[Variant] = {"goals": "uniform", "inverse": "nearest", "search": "perturb"}  # standard baseline
 SCHOOL: Final = ("map-elites", "isoline", "cma-me", "cma-mae")  # algorithms of quality diversity
 SHORT: Final[Variant] = {"movements": 2000, "evaluate_at": (250, 500, 1000)}  # a run is also evaluated at its end
-# Files that ``make_subsets`` makes.
+# Files of demonstrations that ``make_subsets`` writes.
 FEW, MANY, HALF, CORNER, SHUFFLED, TEN, HAND = MADE = tuple(
     Path(f"{name}.npz") for name in ("few", "many", "half", "corner", "shuffled", "ten", "hand")
 )
-# Ways to refine a movement for a goal and to answer in evaluations. Each line is a variant on the rod; a longer
-# name means the same line on an arm.
+# Variants of SGIM-D on the rod with and without a forward model. A name with the ending -arm-7 or -arm-50 has the same
+# options on a planar arm.
 MODEL: Final[Variant] = {**SGIM_D, "inverse": "model-alone"}
 REFINING: Final[dict[str, Variant]] = {
     "sgim-d": SGIM_D,
     "model": MODEL,
     "gradient": {**MODEL, "search": "gradient"},
 }
-SWIMMER: Final[Variant] = {"environment": "swimmer", **SHORT}  # a robot that nobody here wrote
+SWIMMER: Final[Variant] = {"environment": "swimmer", **SHORT}  # a robot of gymnasium
 # Learners of the suite besides `practice`.
 SUITED: Final[dict[str, Variant]] = {
     **REFERENCES,
@@ -87,9 +89,9 @@ SUITED: Final[dict[str, Variant]] = {
     "map-elites": {"algorithm": "map-elites"},
 }
 ON_ROD: Final[Variant] = {"evaluate_at": (250, 500, 1000, 2000), "floor_at": (5000,)}
-ONCE: Final[Variant] = {"teacher": "initial", "teacher.every": 1}  # all demonstrations at the start, one for a movement
+ONCE: Final[Variant] = {"teacher": "initial", "teacher.every": 1}  # at the start, one demonstration a movement
 TAUGHT: Final[Variant] = {**UNIFORM_PRACTICE, "algorithm": "practice-taught", **ONCE}
-# Learners on the rod; rivals with and without the demonstrations.
+# Learners on the rod: the suite's learners, and rivals with and without demonstrations.
 LEARNING: Final[dict[str, Variant]] = {
     f"{name}.rod": {**line, **ON_ROD}
     for name, line in {
@@ -123,10 +125,10 @@ SCHEDULES: Final[dict[str, Variant]] = {
     "uniform-nearest-taught-once": {**SGIM_D, **BASELINE, **ONCE, "social.repeats": 1},
     "map-elites-taught-once": {"algorithm": "map-elites-taught", "imitations": 1, **ONCE},
 }
-# Ten lessons as a person would give them. All come early in a short life.
+# Options of a short run in which ten lessons come early, as a person would give them.
 SESSION: Final[Variant] = {"movements": 1000, "evaluate_at": (300, 500)}  # a run is also evaluated at its end
 SHOWN: Final[dict[str, Variant]] = {"goals": {**SGIM_D, "teacher": "initial"}, "practice": TAUGHT}
-LONGER: Final[Variant] = {"inverse.rate": 2.0}  # training may take longer, because movements of an arm take no time
+LONGER: Final[Variant] = {"inverse.rate": 2.0}  # more training, because movements of a planar arm take no time
 
 # Learners that ask.
 IM: Final[Variant] = {"algorithm": "sgim-im"}
@@ -153,8 +155,7 @@ ASKING: Final[dict[str, Variant]] = {
     "sgim-im-toss": {**IM, **TOSS},
 }
 
-# Settings on which no default was tuned, each with its changes. The name of a variant names its setting, too:
-# sgim-d@noise-twice.
+# Settings on which no default was tuned, each with its changed options. A variant is named like sgim-d@noise-twice.
 ROBOTS: Final[dict[str, Variant]] = {
     "as-it-is": {},
     "noise-none": {"environment.noise": 0.0},
@@ -168,7 +169,7 @@ TEACHERS: Final[dict[str, Variant]] = {
     "shuffled": {"demonstrations": SHUFFLED},
 }
 PRACTICE: Final[Variant] = {"algorithm": "practice"}
-PROVED_MODEL: Final[Variant] = {"inverse": "model"}  # a model that answers as soon as it predicts as well as `process`
+PROVED_MODEL: Final[Variant] = {"inverse": "model"}  # the model answers once it predicts as well as `process`
 BY_PROOF: Final[Variant] = {**SGIM_D, **PROVED_MODEL, "search": "gradient"}
 UNTAUGHT: Final[dict[str, Variant]] = {
     "random": {"algorithm": "random"},
@@ -189,7 +190,7 @@ EVERYWHERE: Final[Variant] = {"movements": 2000, "evaluate_at": (500,)}
 
 
 def _of_teacher(teacher: int, ending: str = "") -> dict[str, Variant]:
-    """Learners taught by demonstrator 1 or 2; the ending "-letter" makes them learn by the paper's letter."""
+    """Learners taught by demonstrator 1 or 2; with the ending "-letter" they learn by the letter of the paper."""
     letter = {"sgim-d": LETTER, "imitation": INVERSE, "observation": INVERSE}
     return {
         f"{algorithm}{ending}-teacher-{teacher}": {
@@ -215,7 +216,7 @@ def _on_arm(arm: str) -> dict[str, Variant]:
 
 
 def _on_suite(learners: dict[str, Variant], tasks: Iterable[str] = SUITE) -> dict[str, Variant]:
-    """Each learner on all tasks except the rod, whose runs are longer, and except the toss if it takes no context."""
+    """Each learner on all tasks, except the rod (its runs are longer) and the toss if the learner takes no context."""
     return {
         f"{name}.{task}": {**line, **TASKS[task].options, **SHORT}
         for task in tasks
@@ -225,7 +226,7 @@ def _on_suite(learners: dict[str, Variant], tasks: Iterable[str] = SUITE) -> dic
 
 
 def _ladder(ending: str, where: Variant) -> dict[str, Variant]:
-    """The steps between the letter, ``sgim-d-letter``, and our defaults, ``sgim-d``."""
+    """The steps between the letter of the paper, ``sgim-d-letter``, and our defaults, ``sgim-d``."""
     found, line = {}, {**SGIM_D, **LETTER, **where}
     for number, (step, _, becomes) in enumerate(STEPS[:-1], 1):
         found[f"ladder-{number}-{step}{ending}"] = line = {**line, **becomes}
@@ -266,7 +267,7 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
         "demonstrations-noise": {"algorithm": "imitation", "teacher.choose": "random"},
         **{name: {"algorithm": name} for name in ("isoline", "cma-me")},
         **{f"{name}-demonstrations": {"algorithm": f"{name}-taught"} for name in ("isoline", "cma-me")},
-        # Rivals with the setting that a search on tuning seeds found better than the default; see results/RIVALS.md.
+        # Rivals with tuned settings: better than the defaults in a search on other seeds, see results/RIVALS.md.
         "map-elites-tuned": {"algorithm": "map-elites", "cells": 10},
         "cma-me-tuned": {"algorithm": "cma-me", "sd": 0.05},
         "cma-mae-demonstrations-tuned": {"algorithm": "cma-mae-taught", "sd": 0.05},
@@ -312,7 +313,7 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
 }
 
 
-# Seeds of each page. They were used once, after the defaults were frozen.
+# Seeds of each page. They were first used after the defaults had been frozen.
 SEEDS: Final[dict[str, range]] = {
     **dict.fromkeys(("learners", "large-space", "letter", "ladder", "ladder-large", "baselines"), range(100, 120)),
     **dict.fromkeys(("teachers", "letter-teachers", "ablations", "teaching"), range(100, 110)),
@@ -336,7 +337,7 @@ def make_subsets(folder: Path, *, by_hand: bool = False) -> None:
     """Write subsets of the shipped demonstrations; if ``by_hand``, write ten lessons by hand, too.
 
     The subsets are the first 13, 83 and 10 of 127 demonstrations, those in the right half of the plane, the 20 nearest
-    to one corner, and all with permuted outcomes, so that recordings and outcomes do not match.
+    to one corner, and all demonstrations with permuted outcomes, as a teacher who mislabels them would show.
 
     Raises:
         OSError: a file cannot be written.
@@ -348,11 +349,11 @@ def make_subsets(folder: Path, *, by_hand: bool = False) -> None:
     dealt = stream(0, "shuffled").permutation(outcomes)
     shuffled = [replace(each, outcome=outcome) for each, outcome in zip(everything, dealt, strict=True)]
     make_folder(folder)
-    # The first of the shipped demonstrations are spread over the plane.
+    # The shipped demonstrations are ordered so that the first ones already spread over the plane.
     first = ((FEW, everything[:13]), (MANY, everything[:83]), (TEN, everything[:10]))
     for name, chosen in (*first, (HALF, right), (CORNER, corner), (SHUFFLED, shuffled)):
         save_demonstrations(folder / name, chosen)
     if by_hand:
-        from hand import lessons_of_a_script  # MuJoCo is loaded only when it is needed
+        from hand import lessons_of_a_script  # imported here, as MuJoCo loads slowly
 
         save_demonstrations(folder / HAND, [lesson.demonstration for lesson in lessons_of_a_script()])

@@ -1,16 +1,16 @@
-"""Measure what the library costs: this checkout alone, or this checkout beside another commit.
+"""Measure time and memory of the library: of this checkout alone (here), or also of another commit (there).
 
-Each measurement runs in turns (here, there, here, there ...), each time in a new process. Ratios are those of medians.
-Times are processor times; other programs still lengthen them, because they empty the caches.
+Each figure is measured in turns (here, there, here, there ...), each time in a new process. The table has the medians
+and their ratio. Times are processor times; other programs still lengthen them, because they empty the caches.
 
-  learning  a learner's time for a movement, without the robot's time; the ratio of both times; a checksum of all
-            outcomes, which shows whether both commits learn alike
-  resume    a run on the fishing rod, and its replay after its end
-  life      a long run on a planar arm of 7 joints: time, the largest memory of the process, the size of its folder
+  learning  a learner's time for a movement, without the robot's time; the learner's time divided by the robot's; a
+            checksum of all outcomes, which is equal if both commits learn equally
+  resume    time of a run on the fishing rod, and of the replay of this run
+  life      a long run on a planar arm of 7 joints: time, largest memory of the process, size of the run's folder
 
 Examples:
-  python scripts/bench.py                                          this checkout alone, some minutes
-  python scripts/bench.py --against main --only learning resume    beside another commit
+  python scripts/bench.py                                          this checkout alone; takes some minutes
+  python scripts/bench.py --against main --only learning resume    this checkout and the commit main
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ Measurement = Callable[[Path, int], Figures]
 
 
 def live(name: str, movements: int) -> Figures:
-    """Figures of a learner's life with the library that this process imports.
+    """Figures of a learner with the library that this process imports.
 
     Args:
-        name: algorithm and robot, one of ``LIVES``; a number means a planar arm with so many joints.
-        movements: number of movements in the life.
+        name: algorithm and robot, one of ``LIVES``; a number is the number of joints of a planar arm.
+        movements: number of movements of the learner.
     """
     import sgimd_torch
     from sgimd_torch import Demonstration, FishingRod, PeriodicTeacher, PlanarArm, run, stream
@@ -81,14 +81,14 @@ def live(name: str, movements: int) -> Figures:
 
 
 def measured(name: str, library: Path, movements: int) -> Figures:
-    """Figures of a life in a new process that imports ``library``."""
+    """Figures of a learner in a new process that imports ``library``."""
     command = [sys.executable, __file__, "--child", name, "--movements", str(movements)]
     done = subprocess.run(command, env=environment(library), stdout=subprocess.PIPE, text=True, check=True)
     return dict(json.loads(done.stdout))
 
 
 def resume(library: Path, movements: int) -> Figures:
-    """A run with default options, and its replay after its end; both include the start of the process."""
+    """Times of a run with default options, and of its replay; both times include the start of the process."""
     with TemporaryDirectory() as folder:
         fresh, _ = command_line(library, folder, f"--movements={movements}")
         replay, _ = command_line(library, folder, f"--movements={movements}", "--resume")
@@ -96,7 +96,7 @@ def resume(library: Path, movements: int) -> Figures:
 
 
 def long_life(library: Path, movements: int) -> Figures:
-    """A run on an arm of 7 joints, whose physics takes hardly any time."""
+    """Figures of a run on an arm of 7 joints, whose physics takes hardly any time."""
     with TemporaryDirectory() as folder:
         words = ("--environment=planar-arm-7", f"--movements={movements}", f"--evaluate-at=[{movements}]")
         seconds, memory = command_line(library, folder, *words)
@@ -132,7 +132,7 @@ def show(name: str, several: list[list[float]]) -> None:
     print(f"{name:45}" + "".join(f"{cell:>12}" for cell in cells), flush=True)
 
 
-PARTS: dict[str, tuple[list[Measurement], int]] = {  # measurements of a library, and their number of movements
+PARTS: dict[str, tuple[list[Measurement], int]] = {  # measurements by name of the part, and their number of movements
     "learning": ([partial(measured, name) for name in LIVES], 2000),
     "resume": ([resume], 5000),
     "life": ([long_life], 100_000),
@@ -142,10 +142,10 @@ PARTS: dict[str, tuple[list[Measurement], int]] = {  # measurements of a library
 def main() -> int:
     """Measure, print a table, and return the exit code 0."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--against", metavar="COMMIT", help="a commit of this repository to compare with")
+    parser.add_argument("--against", metavar="COMMIT", help="commit of this repository to compare with")
     parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS), metavar="PART", help=", ".join(PARTS))
     parser.add_argument("--rounds", type=PositiveInt, default=3, help="repetitions of each figure (default: 3)")
-    parser.add_argument("--movements", type=PositiveInt, help="length of each life (default: that of the part)")
+    parser.add_argument("--movements", type=PositiveInt, help="number of movements of each run (default: by part)")
     parser.add_argument("--child", choices=LIVES, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.child:

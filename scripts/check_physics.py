@@ -1,7 +1,7 @@
-"""Measure the fishing rod: is it stable, smooth and noisy enough, and where does its float fall?
+"""Check the physics of the fishing rod: stability, smoothness, motor noise, and the places where the float lands.
 
 The script prints a line for each property with its bound; the exit code is 1 if a bound is not met. With --time-steps
-it prints only how far the landing, without noise, is from that at time steps of half a millisecond.
+it prints only how far landings without noise move when the time step is longer than half a millisecond.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from sgimd_torch.spaces import Array, stream
 
 SEED = 1
 BATCH = 500
-TIME_STEPS, FINEST = (0.01, 0.005, 0.002, 0.001), 0.0005  # s; the model itself uses the first
+TIME_STEPS, FINEST = (0.01, 0.005, 0.002, 0.001), 0.0005  # s; the shipped model has the first of them
 
 
 def execute(rod: FishingRod, thetas: Array, name: str, start: int = 0) -> Array:
@@ -29,7 +29,7 @@ def execute(rod: FishingRod, thetas: Array, name: str, start: int = 0) -> Array:
 
 
 def landings(rod: FishingRod, thetas: Array, name: str) -> tuple[int, Array]:
-    """The number of movements that diverge, and the landings ``(n, 2)`` m of the others."""
+    """The number of movements whose simulation diverges, and the landings ``(n, 2)`` m of the others."""
     diverged, landed = 0, []
     for start in tqdm(range(0, len(thetas), BATCH), desc=f"{name} movements", unit_scale=BATCH, unit="movement"):
         batch = thetas[start : start + BATCH]
@@ -53,7 +53,7 @@ def at_time_step(step: float) -> FishingRod:
 
 
 def compare_time_steps(movements: int) -> None:
-    """Print distances from landings at coarser steps to landings at ``FINEST``: median, ninth decile, maximum."""
+    """Print distances (m) from landings at longer steps to landings at the step ``FINEST``."""
     draws = stream(SEED, "time steps")
     uniform = draws.random((movements, 25))
     gentle = np.clip(draws.normal(0.5, 0.1, (movements, 25)), 0, 1)
@@ -90,7 +90,7 @@ def main() -> int:
     deviations = repeated.std(axis=1, ddof=1)
     ordered = np.sort(deviations.mean(axis=1))
     spread = float(ordered[-20:].mean() / ordered[:20].mean())
-    # If all movements scattered around their means by the same Gaussian, the kurtosis would be 3.
+    # If the outcomes of all movements scattered with one Gaussian distribution, the kurtosis would be 3.
     pooled = ((repeated - repeated.mean(axis=1, keepdims=True)) / deviations.mean()).ravel()
     kurtosis = float((pooled**4).mean() / (pooled**2).mean() ** 2)
 
@@ -111,11 +111,11 @@ def main() -> int:
     off = float(np.linalg.norm(natural - [0.0, 0.5]))
     rows = [
         (f"{diverged} of {movements} uniform random movements diverged", "0", diverged == 0),
-        (f"{diverged_corners} of {movements // 10} on random corners of the box diverged", "0", diverged_corners == 0),
-        (f"a step of sd .005 moves the landing by {smoothness:.4f} m (median)", "<= .03", smoothness <= 0.03),
-        (f"noise sd {sd:.4f} m a dimension (mean)", ".03 to .075", 0.03 <= sd <= 0.075),
-        (f"outcome_noise promises {rod.outcome_noise:.4f} m", "within 10 %", abs(rod.outcome_noise / sd - 1) <= 0.1),
-        (f"noisiest tenth scatters {spread:.1f} times the quietest", ">= 5", spread >= 5),
+        (f"{diverged_corners} of {movements // 10} at random corners of Pi diverged", "0", diverged_corners == 0),
+        (f"a change of theta, sd .005, moves landings by {smoothness:.4f} m (median)", "<= .03", smoothness <= 0.03),
+        (f"landings scatter with sd {sd:.4f} m (mean)", ".03 to .075", 0.03 <= sd <= 0.075),
+        (f"outcome_noise is {rod.outcome_noise:.4f} m", "within 10 %", abs(rod.outcome_noise / sd - 1) <= 0.1),
+        (f"the noisiest tenth scatters {spread:.1f} times as much as the least noisy", ">= 5", spread >= 5),
         (f"kurtosis of the pooled noise {kurtosis:.1f}", "> 4, a Gaussian has 3", kurtosis > 4),
         (f"densest tile at ({natural[0]:.2f}, {natural[1]:.2f}), {off:.2f} m from (0, .5)", "<= .25", off <= 0.25),
         (f"{100 * rare:.0f} % of benchmark tiles get < .1 % of random movements", ">= 33 %", rare >= 1 / 3),

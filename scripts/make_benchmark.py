@@ -1,8 +1,8 @@
-"""Make the benchmark set: one goal in each tile that several learners reached together (section 5.2 of the paper).
+"""Make the shipped benchmark: one goal in each tile of T that several learners reached together (paper, section 5.2).
 
-The script runs Random, SAGG-RIAC and SGIM-D on the fishing rod, each with several seeds. `sgimd benchmark` cuts T into
-tiles. The side of a tile is chosen so that the learners together reached about 358 tiles, the paper's number. Each of
-these tiles gets one random goal.
+The script runs Random, SAGG-RIAC and SGIM-D on the fishing rod, each with several seeds. `sgimd benchmark` then cuts T
+into tiles. The side of a tile is chosen so that the learners together reached about 358 tiles, as many as in the paper.
+Each of these tiles gets one random goal.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from sgimd_torch.views import benchmark
 
 
 def live(learners: Iterable[tuple[str, int]], movements: int, processes: int, folder: Path) -> list[Path]:
-    """Carry out runs without evaluations; their directories, in the order of ``learners``, (algorithm, seed)."""
+    """Carry out runs of ``learners`` (algorithm, seed) without evaluations, and return their directories, in order."""
     configs = [
         Config(algorithm=algorithm, seed=seed, movements=movements, evaluate_at=(), out=folder)
         for algorithm, seed in learners
@@ -49,7 +49,7 @@ def pooled(learners: Iterable[tuple[str, int]], movements: int, processes: int) 
 
 
 def main() -> None:
-    """Run the learners and make the goals from what they reached."""
+    """Run the learners, and make the goals from their outcomes."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path_fc, default=SHIPPED, help="file to write (default: the shipped one)")
     parser.add_argument("--seed", type=NonNegativeInt, default=2000, help="first seed (default: %(default)s)")

@@ -1,9 +1,9 @@
 """Make the shipped demonstrations of demonstrator 3: simulated kinesthetic recordings on the fishing rod.
 
-The paper's demonstrator 3 was a person who led the arm by hand. These recordings are *simulated*, like those that the
-paper describes: every joint moves monotonically from the start configuration to an end posture, and all joints follow
-one scaled curve. End postures follow one rule with the scatter of a hand, and are chosen so that landing points spread
-evenly over the plane. The speed varies smoothly, as with a hand, so no recording is exactly a motor primitive.
+The paper's demonstrator 3 was a person who led the arm by hand. These recordings are *simulated*, with the properties
+that the paper describes: every joint moves monotonically from the start to an end posture, and all joints follow one
+scaled curve. ``end_posture`` gives the end postures, to which random deviations are added. Recordings are chosen so
+that outcomes spread evenly over the plane. The speed varies smoothly, so no recording is exactly a motor primitive.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from sgimd_torch.demonstrations import SHIPPED, save_demonstrations
 from sgimd_torch.environments.fishing_rod import JOINT_RANGES, FishingRod
 from sgimd_torch.spaces import Array, Demonstration, stream
 
-RATE = 50  # Hz
-DURATIONS = (1.0, 1.4)  # s
-HAND = 0.04  # rad, standard deviation of the hand at end postures
-TREMOR = 0.4  # variation of the speed, relative to the speed
+RATE = 50  # Hz, sampling rate
+DURATIONS = (1.0, 1.4)  # s, shortest and longest recording
+HAND = 0.04  # rad, standard deviation of end postures
+TREMOR = 0.4  # standard deviation of the speed, relative to the speed
 
 
 def end_posture(turn: float, stretch: float) -> Array:
-    """Rule of the teacher, ``(6,)`` rad: ``turn`` in [-1, 1] from right to left, ``stretch`` in [-1, 1] from far behind
-    to far ahead. Yaw and wrist make the turn; shoulder, elbow and wrist make the stretch."""
+    """End posture ``(6,)`` rad: ``turn`` in [-1, 1] goes from right to left, ``stretch`` in [-1, 1] from far behind to
+    far ahead. Yaw and wrist make the turn; shoulder, elbow and wrist make the stretch."""
     middle = (JOINT_RANGES.low + JOINT_RANGES.high) / 2
     sideways = np.array([1.5, 0.0, 0.0, 0.0, 0.0, 1.2])
     ahead = np.array([0.0, -0.65, 0.1, 0.0, -0.75, 0.0])
@@ -34,7 +34,7 @@ def end_posture(turn: float, stretch: float) -> Array:
 
 
 def lead(end: Array, rng: np.random.Generator) -> tuple[Array, Array]:
-    """The arm led from the start configuration to ``end``: times ``(n,)`` s and angles ``(n, 6)`` rad at 50 Hz."""
+    """Times ``(n,)`` s and angles ``(n, 6)`` rad, at ``RATE``, of the arm led from the start to the posture ``end``."""
     start = (JOINT_RANGES.low + JOINT_RANGES.high) / 2
     n = round(rng.uniform(*DURATIONS) * RATE) + 1
     times = np.arange(n) / RATE
@@ -50,7 +50,8 @@ def lead(end: Array, rng: np.random.Generator) -> tuple[Array, Array]:
 
 
 def farthest_points(points: Array, n: int) -> list[int]:
-    """Rows of ``n`` of the ``points``: the first is nearest to the mean, each next one farthest from those chosen."""
+    """Rows of ``n`` spread ``points``: first the point nearest to the mean, then always the point farthest from all
+    chosen ones."""
     chosen = [int(np.linalg.norm(points - points.mean(axis=0), axis=1).argmin())]
     distances = np.full(len(points), np.inf)
     while len(chosen) < n:
@@ -60,11 +61,11 @@ def farthest_points(points: Array, n: int) -> list[int]:
 
 
 def main() -> None:
-    """Record many movements; keep some that spread evenly."""
+    """Make many recordings, and keep some whose outcomes spread evenly."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path_fc, default=SHIPPED, help="file to write (default: the shipped one)")
     parser.add_argument("--n", type=PositiveInt, default=127, help="demonstrations (default: 127, as in the paper)")
-    parser.add_argument("--candidates", type=PositiveInt, default=4000, help="recordings (default: %(default)s)")
+    parser.add_argument("--candidates", type=PositiveInt, default=4000, help="recordings made (default: %(default)s)")
     parser.add_argument("--seed", type=NonNegativeInt, default=2014, help="seed of all draws (default: %(default)s)")
     options = parser.parse_args()
     if options.n > options.candidates:

@@ -1,9 +1,10 @@
-"""Make goals and demonstrations of the swimmer (gymnasium's Swimmer-v5), which are shipped with the package.
+"""Make the shipped goals and demonstrations of the swimmer (gymnasium's Swimmer-v5).
 
-Goals: the script executes random movements, tiles T, and draws one goal in each tile that was reached twice.
-Demonstrations: a simulated teacher swims like a snake. A wave of torques travels along the body, forwards or backwards,
-and an offset steers. The hand shakes, so no recording is exactly a sinusoid. All recordings start alike, without noise.
-The script makes many recordings, and keeps some that spread evenly.
+Goals: the script executes random movements, cuts T into tiles, and draws one goal in each tile that was reached twice.
+Demonstrations: in a simulated recording the swimmer moves like a snake. A wave of torques travels along the body,
+forwards or backwards, and a constant torque steers. Added noise keeps recordings from being exact sinusoids. All
+recordings have the same start, without noise. The script makes many recordings, and keeps some whose outcomes spread
+evenly.
 """
 
 from __future__ import annotations
@@ -23,11 +24,11 @@ from sgimd_torch.spaces import Array, Demonstration, stream
 
 DATA = Path(__file__).resolve().parents[1] / "sgimd_torch" / "data"
 SIDE = 0.15  # side of a tile (m)
-SHAKE = 0.05  # standard deviation of the hand, relative to half the range of a torque
+SHAKE = 0.05  # standard deviation of the noise in recordings, relative to half the range of a torque
 
 
 def wave(rng: np.random.Generator, times: Array) -> Array:
-    """Torques ``(n_times, 2)``: one wave in both joints, in the second a quarter of a period earlier or later."""
+    """Torques ``(n_times, 2)``: a sinusoid in each joint, the second a quarter of a period earlier or later."""
     strength, frequency, steer = rng.uniform(0.2, 1.0), rng.uniform(0.3, 1.2), rng.uniform(-0.4, 0.4)
     lag, start = rng.choice([-0.25, 0.25]), rng.random()
     phases = frequency * times[:, None] + start + np.array([0.0, lag])
@@ -43,7 +44,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=DATA, help="folder of both files (default: the shipped ones)")
     parser.add_argument("--movements", type=PositiveInt, default=2500, help="random movements (default: %(default)s)")
-    parser.add_argument("--candidates", type=PositiveInt, default=600, help="recordings (default: %(default)s)")
+    parser.add_argument("--candidates", type=PositiveInt, default=600, help="recordings made (default: %(default)s)")
     parser.add_argument("--n", type=PositiveInt, default=100, help="demonstrations (default: %(default)s)")
     parser.add_argument("--seed", type=NonNegativeInt, default=2015, help="seed of all draws (default: %(default)s)")
     options = parser.parse_args()

@@ -1,9 +1,9 @@
-"""Make the shipped demonstrations of demonstrators 1 and 2: robots that learnt alone, by SAGG-RIAC, and now teach.
+"""Make the shipped demonstrations of demonstrators 1 and 2, robots that have learnt alone by SAGG-RIAC.
 
 Section 5.3 of the paper. The script runs several SAGG-RIAC learners on the fishing rod and puts their memories
-together. Demonstrator 1 is naive: it shows random exemplars. Demonstrator 2 is careful: it chooses tiles that spread
-evenly, and shows one exemplar on each tile, the one that lands most reliably if the robot executes the exemplars of the
-tile again. Recordings are joint trajectories, as for demonstrator 3, so the learner has to find theta_d by itself.
+together. Demonstrator 1 is naive: it shows random exemplars. Demonstrator 2 is careful: it chooses tiles of T that
+spread evenly, and executes the exemplars of each tile several times. On each tile it shows the exemplar with the least
+scatter of landings. Recordings are joint trajectories, as for demonstrator 3, so the learner has to find theta_d.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ EXECUTIONS = 10  # number of executions of each exemplar
 
 
 def demonstrate(rod: FishingRod, theta: Array, outcome: Array) -> Demonstration:
-    """A demonstration: the commanded trajectory of ``theta`` at 50 Hz, and the landing in memory, ``outcome``."""
+    """A demonstration: the commanded trajectory of ``theta`` at 50 Hz, with the remembered ``outcome``."""
     return Demonstration(np.zeros(0), *rod.primitive.trajectory(theta), outcome)
 
 
 def on_tiles(outcomes: Array, n: int) -> list[np.ndarray]:
-    """Rows of ``outcomes`` ``(m, 2)`` m, tile by tile; the side is chosen so that about 1.1 n tiles are not empty."""
+    """Rows of ``outcomes`` ``(m, 2)`` m in each tile; tiles have a side at which about 1.1 n tiles are not empty."""
     side = min(np.linspace(0.05, 0.4, 141), key=lambda side: abs(len(np.unique(outcomes // side, axis=0)) - 1.1 * n))
     _, tile_of = np.unique(outcomes // side, axis=0, return_inverse=True)
     return [np.flatnonzero(tile_of == tile) for tile in range(tile_of.max() + 1)]
@@ -45,7 +45,7 @@ def execute_again(rod: FishingRod, thetas: Array, rng: np.random.Generator) -> A
 
 
 def most_reliable(landed: Array) -> tuple[int, Array]:
-    """Column of ``landed`` ``(n_executions, n, 2)`` m that varies least, and the column's most typical landing."""
+    """The column of ``landed`` ``(n_executions, n, 2)`` m that varies least, and the landing nearest to its mean."""
     best = int(landed.var(axis=0).sum(axis=1).argmin())
     typical = np.linalg.norm(landed[:, best] - landed[:, best].mean(axis=0), axis=1).argmin()
     return best, landed[typical, best]

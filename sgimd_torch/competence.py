@@ -13,17 +13,17 @@ from sgimd_torch.spaces import Array
 
 
 def performance(goal: Array, outcome: Array, rest: Array, d_min: float) -> Array:
-    """Eq. (7): the distance left between goal and outcome, relative to the distance from the goal to ``rest``.
+    """Eq. (7): minus the distance between goal and outcome, relative to the distance between goal and ``rest``.
 
-    It is 0 when the outcome meets the goal, and -1 when it is no better than not moving.
+    Performance is 0 if the outcome meets the goal, and -1 if the outcome is no better than not moving.
 
     Args:
         goal: ``(..., outcome_dim)`` m.
         outcome: ``(..., outcome_dim)`` m; leading axes broadcast with ``goal``.
         rest: ``(outcome_dim,)`` m, the outcome of not moving, the paper's tau_org.
         d_min: least distance (m) of a goal from ``rest``, > 0, for example the standard deviation of the noise.
-            Deviation: eq. (7) is 0/0 for a goal at ``rest``, and near ``rest`` noise alone gives -1, so nearer goals
-            are judged as if they were ``d_min`` away.
+            Deviation: eq. (7) is 0/0 for a goal at ``rest``, and near ``rest`` noise alone gives -1. So a goal nearer
+            than ``d_min`` is judged as if its distance from ``rest`` were ``d_min``.
 
     Returns:
         Performance ``(...)`` in [-1, 0].
@@ -39,11 +39,11 @@ def performance(goal: Array, outcome: Array, rest: Array, d_min: float) -> Array
 class Competence(Judge):
     """Competence by the best outcome ever remembered, as in the paper.
 
-    It is gamma of eq. (2), over the whole memory. In one context it never falls.
+    This is gamma of eq. (2), over the whole memory. In one context it never falls.
 
-    Deviation: the paper prints the minimum over memory, but J is negative, so the best J is the maximum. J falls with
-    distance, so the nearest outcome is the best. Deviation: eq. (2) demands an equal context, but contexts drawn from a
-    continuum never recur; the nearest exemplar in (context, outcome) is used instead.
+    Deviation: the paper prints the minimum over memory, but J is negative, so the best J is the maximum, the J of the
+    nearest outcome. Deviation: eq. (2) demands an equal context, but contexts drawn from a continuum never recur; the
+    nearest exemplar in (context, outcome) is used instead.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -52,9 +52,9 @@ class Competence(Judge):
         self._row: int | None = None
 
     def __call__(self, context: Array, goal: Array, outcomes: Array | None = None) -> float:
-        """Competence in [-1, 0], -1 for an empty memory; the ``outcomes`` of the attempt are in memory already.
+        """Competence in [-1, 0], -1 for an empty memory; ``outcomes`` is not used, as they are in memory already.
 
-        A second call for an equal goal, as after each movement of an attempt, compares only newer exemplars.
+        Further calls with the same context and goal, as during an attempt, compare only newer exemplars.
         """
         asked = np.asarray(context).tobytes(), np.asarray(goal).tobytes()
         if asked != self._asked:
@@ -69,7 +69,7 @@ class Competence(Judge):
 class AttemptCompetence(Judge):
     """Competence by the best outcome of the attempt alone.
 
-    This is the competence of SAGG-RIAC. It falls when a movement stops working, so interest responds to the change.
+    This is the competence of SAGG-RIAC. It falls if a movement no longer reaches the goal, and interest shows this.
     """
 
     def __call__(self, context: Array, goal: Array, outcomes: Array) -> float:

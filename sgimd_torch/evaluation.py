@@ -1,7 +1,7 @@
-"""Evaluation: the mean distance from goals, spread over the reachable space, to the outcomes of the answers to them.
+"""Evaluation: the mean error of an inverse model at goals that are spread over the reachable space.
 
-Section 5.2 and eq. (10) of Nguyen & Oudeyer (2014). An evaluation does not change the learner: it executes movements
-without learning or remembering, with random streams of its own.
+Section 5.2 and eq. (10) of Nguyen & Oudeyer (2014). An evaluation does not change the learner: nothing is learnt from
+its movements, and it has random streams of its own.
     benchmark = load_benchmark(); evaluation = evaluate(inverse, environment, benchmark.goals, seed, step)
 """
 
@@ -23,7 +23,7 @@ from sgimd_torch.spaces import Array, Box, check_count, check_vector, first_entr
 
 SHIPPED = Path(__file__).with_name("data") / "benchmark.npz"
 TILES: Final = 358  # number of goals in the paper's benchmark
-SIDES: Final = np.linspace(0.025, 0.1, 301)  # sides of a tile relative to T's side, for 1600 to 100 tiles in the plane
+SIDES: Final = np.linspace(0.025, 0.1, 301)  # sides of a tile to try, relative to T's: 1600 to 100 tiles in the plane
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +32,8 @@ class Benchmark:
 
     Args:
         environment: name of the class of the environment that the goals were made for.
-        goals: ``(n, outcome_dim)`` m.
-        side: side (m) of the tiles in which the goals were drawn.
+        goals: ``(n, outcome_dim)``, in the unit of T.
+        side: side of the tiles in which the goals were drawn, in the unit of T.
     """
 
     environment: str
@@ -44,7 +44,7 @@ class Benchmark:
         """Refuse an environment that these goals were not made for.
 
         Raises:
-            ValueError: another class, other outcome dimensions, or goals outside its T.
+            ValueError: its class or its outcome dimensions differ, or goals lie outside its T.
         """
         found = type(environment).__name__
         if found != self.environment or environment.outcomes.dim != self.goals.shape[1]:
@@ -66,12 +66,12 @@ class Evaluation:
     """The result of ``evaluate``, a row for each goal.
 
     Args:
-        errors: ``(n,)`` m; the distance from ``rest`` to the goal if the movement failed.
-        thetas: ``(n, theta_dim)``, the movements executed.
+        errors: ``(n,)``, distance of the outcome from the goal; of ``rest`` from the goal if the movement failed.
+        thetas: ``(n, theta_dim)``, executed movements.
         outcomes: ``(n, outcome_dim)``; NaN if the movement failed.
-        scatter: ``(n,)`` m, estimated mean distance from the repeated outcomes of a theta to their true mean; NaN if
+        scatter: ``(n,)``, estimated mean distance of the repeated outcomes of a theta from their true mean; NaN if
             there are no repeats.
-        contexts: ``(n, context_dim)``, the contexts of the movements.
+        contexts: ``(n, context_dim)``, contexts of the movements.
         failed: ``(n,)``, whether the movement failed.
     """
 
@@ -84,12 +84,12 @@ class Evaluation:
 
     @property
     def mean_error(self) -> float:
-        """Eq. (10), m."""
+        """Mean error, eq. (10), in the unit of T."""
         return float(self.errors.mean())
 
     @property
     def noise_floor(self) -> float:
-        """The part of ``mean_error`` (m) that noise alone makes; the rest is bias."""
+        """The part of ``mean_error`` that noise alone makes; the remaining part is bias."""
         known = self.scatter[np.isfinite(self.scatter)]
         return float(known.mean()) if len(known) else float("nan")
 
@@ -99,12 +99,12 @@ class Evaluation:
         return replace(self, scatter=np.full_like(self.scatter, np.nan))
 
     def met(self, near: float) -> int:
-        """The number of goals with an error of ``near`` (m) or less."""
+        """The number of goals with an error of ``near`` or less."""
         return int((self.errors <= near).sum())
 
 
 def contexts_of_goals(environment: Environment, n: int) -> Array:
-    """``(n, context_dim)``, an observed context for each goal; evaluations share them, so comparisons are paired."""
+    """``(n, context_dim)``, an observed context for each goal, equal in all evaluations, so comparisons are paired."""
     if environment.contexts.dim == 0:
         return np.zeros((n, 0))
     drawn = [environment.observe(stream(0, "contexts of evaluation", goal)) for goal in range(n)]
@@ -128,17 +128,17 @@ def evaluate(
     Args:
         inverse: inverse model, whose ``answer_many`` is called; its memory must not be empty.
         environment: environment of the movements; a `BatchEnvironment` executes them together.
-        goals: ``(n, outcome_dim)`` m.
-        seed, step: numbers of the random streams; each evaluation of a run has its own step, such as the number of
-            movements so far.
+        goals: ``(n, outcome_dim)``, in the unit of T.
+        seed: number from which the random streams come.
+        step: number that distinguishes the evaluations of a run, such as the number of movements so far.
         context: ``(context_dim,)`` for all goals, or ``(n, context_dim)``; None for `contexts_of_goals`.
-        repeats: number k of repetitions of each movement, 2 or more; 0 to leave the noise unmeasured. Outcomes lie
-            nearer to their own mean than to the true mean, so the scatter is multiplied by sqrt(k / (k - 1)): for
-            Gaussian noise the mean scatter is then equal for all k.
+        repeats: number k of repetitions of each movement, 2 or more; 0 to leave the noise unmeasured. The measured
+            scatter is multiplied by sqrt(k / (k - 1)), because outcomes lie nearer to their own mean than to the true
+            mean; for Gaussian noise the result does not depend on k.
 
     Raises:
-        ValueError: there are no goals, goals of another dimension or not finite, or repeats or step are out of range.
-        RuntimeError: the memory behind ``inverse`` is empty.
+        ValueError: there are no goals, goals have another dimension or are not finite, or a number is out of its range.
+        RuntimeError: the memory of ``inverse`` is empty.
     """
     goals = check_vector("goals", goals, environment.outcomes.dim)
     if goals.ndim != 2 or len(goals) == 0:
@@ -152,7 +152,7 @@ def evaluate(
         given = environment.contexts.check("context", context)
         contexts = np.broadcast_to(given, (len(goals), environment.contexts.dim))
     thetas = np.stack([estimate.theta for estimate in inverse.answer_many(contexts, goals)])
-    copies = np.tile(thetas, (1 + repeats, 1))  # all goals once, then all repeats, so that errors do not depend on them
+    copies = np.tile(thetas, (1 + repeats, 1))  # repeats come last, so that errors do not depend on their number
     landed = _landed(environment, np.tile(contexts, (1 + repeats, 1)), copies, seed, f"evaluation {step}")
     landed = landed.reshape(1 + repeats, *goals.shape)
     outcomes, again = landed[0], landed[1:]
@@ -166,39 +166,39 @@ def evaluate(
 
 
 def _landed(environment: Environment, contexts: Array, thetas: Array, seed: int, name: str) -> Array:
-    """``(n, outcome_dim)``, NaN for a failed movement; movement i has stream i of this ``name``."""
+    """Outcomes ``(n, outcome_dim)``, NaN for a failed movement; movement i has stream i of this ``name``."""
     rows = range(len(thetas))
     if isinstance(environment, BatchEnvironment):
         with suppress(Exception, SystemExit):  # a movement failed; the loop below finds it
             return execute_many(environment, contexts, thetas, [stream(seed, name, row) for row in rows])
     landed = np.full((len(thetas), environment.outcomes.dim), np.nan)
     for row in rows:
-        with suppress(Exception, SystemExit):  # no error of a robot may end an evaluation
+        with suppress(Exception, SystemExit):  # no failure of a robot may end an evaluation
             landed[row] = execute_many(environment, contexts[[row]], thetas[[row]], [stream(seed, name, row)])[0]
     return landed
 
 
 def tile_goals(outcomes: Array, box: Box, side: float, rng: np.random.Generator) -> Array:
-    """One random goal in each tile of the apparent reachable space.
+    """One random goal in each tile of T with two outcomes or more.
 
     Args:
-        outcomes: ``(n, outcome_dim)`` m, outcomes of several runs; outcomes outside ``box`` do not count.
+        outcomes: ``(n, outcome_dim)``, outcomes of several runs; outcomes outside ``box`` do not count.
         box: T.
-        side: side of a tile (m).
+        side: side of a tile, in the unit of T.
         rng: random stream of the goals.
 
     Returns:
-        ``(n_tiles, outcome_dim)`` m, in the order of the tiles.
+        ``(n_tiles, outcome_dim)``, in the order of the tiles.
     """
     tiles = _reached(outcomes, box, side)
     return box.clip(box.low + (tiles + rng.random(tiles.shape)) * side)
 
 
 def tile_side(outcomes: Array, box: Box, tiles: int = TILES) -> float:
-    """The side (m) that gives about ``tiles`` reachable tiles; other arguments as for `tile_goals`.
+    """The side of a tile with which about ``tiles`` tiles have two outcomes or more; see `tile_goals`.
 
-    In the plane the side is a fortieth to a tenth of T's side; a T of other dimensions has as many tiles as a T in the
-    plane. If outcomes span less than a tenth of a side of T, their span counts instead of that side.
+    In the plane the side is a fortieth to a tenth of T's side. In other dimensions it is chosen so that T has as many
+    tiles as in the plane. If outcomes span less than a tenth of a side of T, their span replaces that side.
     """
     inside = outcomes[box.contains(outcomes)]
     reached = np.ptp(inside, axis=0) if len(inside) else box.sides
@@ -208,11 +208,11 @@ def tile_side(outcomes: Array, box: Box, tiles: int = TILES) -> float:
 
 
 def _reached(outcomes: Array, box: Box, side: float) -> Array:
-    """``(n_tiles, dim)``, the tiles of T with two outcomes or more, counted from T's lower corner, in order."""
+    """``(n_tiles, dim)``, tiles of T with two outcomes or more, numbered in each dimension from T's lower corner."""
     inside = outcomes[box.contains(outcomes)]
     tiles = np.floor((inside - box.low) / side)
     per_side = np.floor(box.sides / side) + 1
-    if np.log2(per_side).sum() < 53:  # numbers of tiles are quicker to sort than their rows
+    if np.log2(per_side).sum() < 53:  # one number for each tile, because numbers are quicker to sort than rows
         numbers = tiles @ np.append(np.cumprod(per_side[:0:-1])[::-1], 1.0)
         _, first, counts = np.unique(numbers, return_index=True, return_counts=True)
         tiles = tiles[first]
@@ -222,10 +222,10 @@ def _reached(outcomes: Array, box: Box, side: float) -> Array:
 
 
 def save_benchmark(path: str | os.PathLike[str], benchmark: Benchmark) -> None:
-    """Write a file for ``load_benchmark``; it appears whole or not at all.
+    """Write a file for ``load_benchmark``, whole or not at all.
 
     Raises:
-        ValueError: a benchmark that ``load_benchmark`` would refuse.
+        ValueError: ``load_benchmark`` would refuse the benchmark.
         OSError: ``path`` is a directory, or cannot be written.
     """
     name, goals, side = np.array(benchmark.environment), np.asarray(benchmark.goals), np.array(benchmark.side)

@@ -1,6 +1,6 @@
 """Functions that write a file whole or not at all, and functions that refuse to read a damaged file.
 
-Every function that replaces a file uses this module.
+All modules of the library replace files by these functions.
     write_text(folder / "report.html", page)
     with replacing(folder / "film.mp4") as partial: encode(frames, partial)
 """
@@ -68,11 +68,12 @@ def write_npz(path: str | os.PathLike[str], arrays: Mapping[str, Any]) -> None:
 
 
 def read_npz(path: str | os.PathLike[str], kind: str, writer: str, names: Sequence[str]) -> list[Stored]:
-    """Read the arrays with these ``names``, which become read-only. No code in the file is executed.
+    """Read the arrays with these ``names``, as read-only arrays. Code in the file is never executed.
 
     Args:
         path: npz file.
-        kind, writer: kind of the file, and command that writes such files, for error messages.
+        kind: kind of the file, for error messages.
+        writer: command that writes such files, for error messages.
         names: names of the arrays.
 
     Raises:
@@ -92,7 +93,7 @@ def read_npz(path: str | os.PathLike[str], kind: str, writer: str, names: Sequen
                 found = {name: stored[name] for name in names if name in stored}
             for array in found.values():
                 array.flags.writeable = False
-        except _UNREADABLE as error:  # numpy's own message would advise to allow pickle
+        except _UNREADABLE as error:  # numpy's own message advises allow_pickle=True, which is unsafe
             raise refused("it is damaged, or holds more than numbers") from error
     if missing := [name for name in names if name not in found]:
         raise refused(f"it lacks {', '.join(missing)}")

@@ -1,7 +1,7 @@
-"""Parts of a learner: one base class for each kind, with what a part must do and may do.
+"""Parts of a learner: one base class for each kind of part, with the methods that a part must have and may have.
 
-A part derives from the class of its kind and is built from one `Problem`. Its options are keywords with a default, and
-also options of ``sgimd run``. A part must define the abstract methods; all other methods have a default.
+A part derives from the class of its kind and is built from one `Problem`. Its keywords with a default are its options,
+also of ``sgimd run``. A part must define the abstract methods; all other methods have a default.
     class Mine(Goals): ...
     learner = sagg_riac(environment, seed, goals=partial(Mine, candidates=5))
     # sgimd run --goals mine:Mine --goals.candidates 5, where mine.py is in the working directory
@@ -40,11 +40,11 @@ class Problem:
         tolerance: distance in the unit of T at which a goal counts as reached: the outcome noise, but at least .02.
         memory: exemplars of the learner.
         inverse: inverse model, which is made before all other parts.
-        remarks: sentences for the user, for example that one part switches another one off.
+        remarks: sentences for the user, for example that exploration does not widen.
         autonomous: autonomous strategy, which is made before the social one.
 
     Raises:
-        ValueError: `check_robot` refuses the robot, or exemplars do not fit it.
+        ValueError: `check_robot` refuses the environment, or ``memory`` has exemplars of another robot.
     """
 
     autonomous: Strategy
@@ -83,7 +83,7 @@ class Problem:
         return self._shared[key]
 
     def over(self, memory: Memory) -> Problem:
-        """This problem with another ``memory``, for a part that uses some exemplars only."""
+        """This problem with another ``memory``, for a part that uses only some exemplars."""
         other = copy(self)
         other.memory = memory
         return other
@@ -95,7 +95,7 @@ class Problem:
 
 
 class Part(Built):
-    """A part of a learner. Its random numbers come from ``rng``, the stream of the problem named ``draws_from``."""
+    """A part of a learner. Its random numbers come from ``rng``, the stream of the problem with name ``draws_from``."""
 
     draws_from: str = ""
 
@@ -117,11 +117,11 @@ class Trained(ABC):
 
     @abstractmethod
     def listener(self, life: Any) -> Any:
-        """A `runs.run.Listener` that calls `refresh` in this `Life`."""
+        """Listener (`runs.run.Listener`) that calls `refresh` in the run ``life`` (`runs.run.Life`)."""
 
 
 class Goals(Part):
-    """Goal model: chooses goals by the results of earlier ones (section 3.2). `goals.checks` checks its arguments."""
+    """Goal model: chooses goals by the results of earlier goals (section 3.2). `goals.checks` has argument checks."""
 
     draws_from = "goals"
 
@@ -138,10 +138,10 @@ class Goals(Part):
         Args:
             context: ``(context_dim,)`` in C.
             goal: ``(outcome_dim,)`` in T.
-            competence: competence at this goal now, in [-1, 0].
-            strategy: name of the strategy that had chosen the goal.
-            gain: rise of the competence at this goal; without a rise, competence of the attempt alone minus competence
-                before it.
+            competence: competence at this goal when the attempt ends, in [-1, 0].
+            strategy: name of the strategy that chose the goal.
+            gain: rise of the competence at this goal during the attempt; if there is none, the competence of the
+                attempt alone minus the competence before the attempt.
         """
 
     @property
@@ -167,12 +167,12 @@ class Inverse(Part):
         return [self(context, goal) for context, goal in zip(contexts, goals, strict=True)]
 
     def predict(self, context: Array, theta: Array) -> Array | None:
-        """Expected outcome ``(outcome_dim,)`` of ``theta`` ``(theta_dim,)``; None, the default, if it is unknown."""
+        """Expected outcome ``(outcome_dim,)`` of ``theta`` ``(theta_dim,)``. Default: None, which means unknown."""
         return None
 
     def effects(self) -> Memory | None:
-        """Exemplars with an effect, for a robot most of whose movements have no effect. Default: None, which means
-        that all movements have an effect."""
+        """Exemplars with an effect, if most movements of the robot have no effect. Default: None, which means that all
+        movements have an effect."""
         return None
 
 
@@ -187,7 +187,7 @@ class Search(Part):
 
 
 class Explore(Part):
-    """Global exploration: movements where the inverse model knows nothing (section 4.4.1)."""
+    """Global exploration: movements that do not depend on the goal (section 4.4.1)."""
 
     draws_from = "look"
 
@@ -197,12 +197,12 @@ class Explore(Part):
 
     @property
     def share(self) -> float | None:
-        """Probability of a global movement; None, the default, if it follows from competence."""
+        """Probability of a global movement. Default: None, which means that competence at the goal decides."""
         return None
 
 
 class Judge(Part):
-    """Judge: measures the competence of an attempt, of which the goal model is told when it ends (eq. 2)."""
+    """Judge: measures the competence of an attempt for the goal model, when the attempt ends (eq. 2)."""
 
     @abstractmethod
     def __call__(self, context: Array, goal: Array, outcomes: Array) -> float:
@@ -214,8 +214,8 @@ class Strategy(Part):
 
     @abstractmethod
     def attempt(self, context: Array) -> AskingAttempt:
-        """Yield the movements of an attempt in one context. The attempt must contain a movement or a rest, even
-        if a request has no reply."""
+        """Yield the movements of an attempt in one context. Every attempt must contain a movement or a rest, even if a
+        request has no reply."""
 
     @property
     def regions(self) -> Sequence[Any]:
@@ -232,12 +232,12 @@ class Social(Part):
 
 
 class Teacher(Built):
-    """Teacher who demonstrates without being asked: the paper's What, How and When (section 2.3).
+    """Teacher who chooses demonstrations and their times, without requests (section 2.3: What, How and When).
 
     The constructor gets ``(demonstrations, rng)`` and options.
 
     Attributes:
-        who: name, in the record, of the person who has shown the last offer.
+        who: name of the person who gave the last demonstration, for the record.
         needs_demonstrations: False for a teacher without prepared demonstrations.
     """
 

@@ -1,7 +1,7 @@
-"""Spaces, episodes and random streams: the vocabulary of all other modules.
+"""Spaces, episodes and random streams: the types that all other modules share.
 
-Section 2.1 of Nguyen & Oudeyer (2014): contexts c in C, policies theta in Pi, outcomes tau in T, and a
-learning episode (context, policy, outcome). This module needs only numpy; it knows no learning and no physics.
+Section 2.1 of Nguyen & Oudeyer (2014): contexts c in C, policies theta in Pi, outcomes tau in T, and the
+learning episode (context, policy, outcome). This module imports only numpy.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
-_LARGEST: Final = 1e100  # squared distances between numbers up to this size do not overflow
+_LARGEST: Final = 1e100  # largest absolute value accepted; squared distances between such values do not overflow
 
 
 def stream(seed: int, name: str, index: int | None = None) -> np.random.Generator:
@@ -26,14 +26,15 @@ def stream(seed: int, name: str, index: int | None = None) -> np.random.Generato
     Args:
         seed: seed of the run, >= 0.
         name: use of the draws, such as ``"environment"``, ``"goals"``, ``"search"`` or ``"teacher"``.
-        index: number of the stream if several have this name, such as that of the movement; None for a single stream.
+        index: number of the stream if several streams have this name, such as the number of a movement; None for a
+            single stream.
 
     Raises:
         ValueError: the seed or the index is not a whole number >= 0.
     """
     words = _words_of_name(check_count("seed", seed, 0), name)
     if index is not None:
-        # 256 separates the index from the name: no byte is as large.
+        # 256 separates the index from the name, because no byte of the name is as large.
         end = np.array([256, *_words(check_count("index", index, 0))], dtype=np.uint32)
         words = np.concatenate((words, end))
     return np.random.Generator(np.random.PCG64(np.random.SeedSequence(words)))
@@ -41,7 +42,7 @@ def stream(seed: int, name: str, index: int | None = None) -> np.random.Generato
 
 @lru_cache
 def _words_of_name(seed: int, name: str) -> NDArray[np.uint32]:
-    """The words that ``SeedSequence(seed, spawn_key=name.encode())`` mixes; mixing an array is several times faster."""
+    """The 32-bit words that ``SeedSequence(seed, spawn_key=name.encode())`` mixes; it mixes an array of them faster."""
     words = _words(seed)
     return np.array([*words, *[0] * (4 - len(words)), *name.encode()], dtype=np.uint32)
 
@@ -57,10 +58,10 @@ def check_vector(name: str, value: ArrayLike, dim: int, hint: str = "") -> Array
     """``value`` as float64 of shape ``(..., dim)``, every entry finite and at most 1e100 in size.
 
     Raises:
-        ValueError: anything but real numbers (complex numbers, text, True and False, dates, masked arrays), another
-            last axis, or an entry that is NaN, infinite or so large that squared distances may overflow.
+        ValueError: ``value`` is not an array of real numbers (complex numbers, text, True and False, dates and masked
+            arrays are refused), has another last axis, or an entry that is not finite or beyond 1e100.
     """
-    # Nearly all calls end here. If a number is above 1e100, infinite or NaN, the sum of squares is larger, or NaN.
+    # Nearly all calls end here. If a number is above 1e100 or not finite, the sum of squares is above 1e199 or NaN.
     if type(value) is np.ndarray and value.dtype == np.float64 and value.shape[-1:] == (dim,):
         with_itself = np.vdot(value, value)
         if with_itself < 1e199:
@@ -87,7 +88,7 @@ def check_point(name: str, value: ArrayLike, dim: int, hint: str = "") -> Array:
     """``value`` as float64 of shape ``(dim,)``: one context, theta, goal or outcome.
 
     Raises:
-        ValueError: as `check_vector`, or ``value`` holds several points.
+        ValueError: ``value`` holds several points, or `check_vector` refuses it.
     """
     array = check_vector(name, value, dim, hint)
     if array.ndim != 1:
@@ -118,7 +119,7 @@ def check_rng(rng: object) -> None:
 
 
 def first_entry(array: Array, wrong: NDArray[np.bool_]) -> str:
-    """The first ``wrong`` entry of ``array`` and the number of other wrong ones, for an error message of one line."""
+    """Text for a message: the first ``wrong`` entry of ``array``, and the number of other wrong entries."""
     entries = np.argwhere(wrong)
     more = f" (and {len(entries) - 1} more)" if len(entries) > 1 else ""
     return f"entry {entries[0].tolist()} is {array[tuple(entries[0])]}{more}"
@@ -130,7 +131,7 @@ def _in_short(value: object) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Box:
-    """An axis-aligned box: C, Pi or T. ``dim`` may be 0, the empty context of the fishing task.
+    """An axis-aligned box: C, Pi or T. The number of dimensions may be 0, as for C of the fishing task.
 
     Args:
         low: ``(dim,)`` lower corner.
@@ -139,7 +140,7 @@ class Box:
         unit: unit of all dimensions, such as "m"; "" for none.
 
     Raises:
-        ValueError: corners of different shapes, not finite or not in order, or a wrong number of names.
+        ValueError: the corners differ in shape, are not finite or not in order, or the number of names is wrong.
     """
 
     low: Array
@@ -170,7 +171,7 @@ class Box:
 
     @property
     def dim(self) -> int:
-        """Number of dimensions, 0 for the empty context."""
+        """Number of dimensions."""
         return len(self.low)
 
     @property
@@ -235,9 +236,8 @@ class Move:
 
 
 class Estimate(NamedTuple):
-    """The answer of an inverse model to a goal: ``theta`` ``(theta_dim,)``, and the exemplars behind it, ``thetas``
-    ``(k, theta_dim)`` with their ``outcomes`` ``(k, outcome_dim)``. ``context`` ``(context_dim,)`` belongs to the goal.
-    """
+    """The answer of an inverse model to a goal in a ``context`` ``(context_dim,)``: ``theta`` ``(theta_dim,)``, and
+    exemplars at which a search may begin, ``thetas`` ``(k, theta_dim)`` with ``outcomes`` ``(k, outcome_dim)``."""
 
     theta: Array
     thetas: Array
@@ -247,16 +247,16 @@ class Estimate(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Demonstration:
-    """(c_d, zeta_d, tau_d), kept as read-only copies.
+    """A demonstration (c_d, zeta_d, tau_d), as read-only copies.
 
     Args:
         context: ``(context_dim,)``.
         times: ``(n_times,)`` s, increasing.
         trajectory: ``(n_times, n_joints)``, joint angles (rad) or commands at ``times``.
-        outcome: ``(outcome_dim,)`` of this movement.
+        outcome: ``(outcome_dim,)``, demonstrated outcome.
 
     Raises:
-        ValueError: other shapes, numbers that are not finite, or times that do not increase.
+        ValueError: an array has another shape or is not finite, or times do not increase.
     """
 
     context: Array
@@ -281,8 +281,8 @@ class Demonstration:
 
 @dataclass(frozen=True, eq=False)
 class Request:
-    """A learner's request to the ``teacher`` of this name for a demonstration of ``goal`` ``(outcome_dim,)``, kept as a
-    read-only copy. ``strategy`` names the strategy that would use the demonstration, for analysis only."""
+    """A learner's request to the teacher with the name ``teacher`` for a demonstration of ``goal`` ``(outcome_dim,)``.
+    ``strategy`` is the name of the strategy that would use the demonstration, for analysis only."""
 
     teacher: str
     goal: Array
@@ -328,7 +328,7 @@ class Episode:
 
 
 def _own(new: Move | Demonstration | Request | Episode, *names: str) -> None:
-    """Replace arrays of a new object by read-only copies, so that later changes elsewhere do not change it."""
+    """Replace arrays of a new object by read-only copies, so that changes of the original arrays do not matter."""
     for name in names:
         value = getattr(new, name)
         if value is not None:
@@ -343,11 +343,11 @@ def read_only(value: ArrayLike) -> Array:
 
 
 Attempt = Generator[Move | None, Array, None]
-"""A generator of movements that is sent their outcomes. It yields None to rest for one movement; ``close()`` interrupts
-it."""
+"""Generator of movements, which is sent their outcomes. It yields None to rest for one movement; ``close()`` interrupts
+the attempt."""
 
 AskingAttempt = Generator[Move | Request | None, Any, None]
-"""An attempt that may also yield a `Request`; it is then sent a `Lesson`, or None if no demonstration was given."""
+"""Attempt that may also yield a `Request`; it is then sent a `Lesson`, or None if there is no demonstration."""
 
 Search = Callable[[Estimate, Array], Generator[Array, Array, None]]
-"""(start, goal) -> a generator of thetas that is sent their outcomes ``(outcome_dim,)``."""
+"""Function (start, goal) -> generator of thetas, which is sent their outcomes ``(outcome_dim,)``."""

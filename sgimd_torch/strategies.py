@@ -1,7 +1,7 @@
 """Strategies of exploration: the next movement, autonomous or after a demonstration.
 
 Sections 3.1, 4.2 and 4.4 of Nguyen & Oudeyer (2014). An attempt is a generator: it yields a movement, and the learner
-sends the outcome. So the code reads like the paper's, and a demonstration can interrupt it at any movement.
+sends the outcome. So the code reads like the paper's, and a demonstration can interrupt an attempt at any movement.
     autonomous: Babble, Rest, GoalBabbling          social: Mimic, Imitate, Emulate, Remember
 """
 
@@ -30,7 +30,7 @@ class Babble(Strategy):
 
 
 class Rest(Strategy):
-    """Rest for one movement, as an observation learner does, or an imitation learner before the first demonstration."""
+    """Rest for one movement, for learning by observation, and for imitation before the first demonstration."""
 
     def attempt(self, context: Array) -> Attempt:
         """No movement."""
@@ -40,24 +40,24 @@ class Rest(Strategy):
 class GoalBabbling(Strategy):
     """Goal-directed policy optimisation, section 4.4: choose a goal, then search for a movement that reaches it.
 
-    The competence at the goal, from all remembered movements, decides between global and local movements.
+    The lower the competence at the goal, the more probable is a global movement instead of a local one.
 
     Args:
-        problem: problem to learn; its inverse model is used.
+        problem: problem to learn, with the inverse model.
         goals: goal model.
         search: part that refines the estimate of the inverse model by movements.
         explore: part that makes the global movements.
         judge: part that measures the competence of an attempt for the goal model.
         budget: largest number of movements for one goal. Deviation: the paper has no such number. With a complete
-            simplex of 26 movements a goal would take about 60 movements, and a learner with the rod could try only a
+            simplex of 26 movements a goal would take about 60 movements, and a run with the rod would try only a
             hundred goals.
         tolerance: distance, in the unit of outcomes, at which a goal counts as reached; None for the outcome noise, but
-            at least .02. It matters only with a budget above 1.
-        global_range: least and greatest probability of a movement by the explorer instead of the search; it rises with
-            the distance of the goal from all reached outcomes.
+            at least .02. With a budget of 1 this option has no effect.
+        global_range: least and greatest probability of a movement by the explorer instead of the search. The
+            probability rises with the distance of the goal from the nearest reached outcome.
         give_up: competence (0: reached, -1: worst) below which a goal is given up after a movement without progress; -1
-            for never. It matters only with a budget above 1. Deviation: the paper spends the whole budget on each goal.
-            If the task space is far larger than the reachable part, nearly all movements are lost in this way.
+            for never. With a budget of 1 this option has no effect. Deviation: the paper spends the whole budget on
+            each goal. If the task space is far larger than the reachable part, nearly all movements are then wasted.
 
     Raises:
         ValueError: a number is out of its range, or a part is of another kind.
@@ -124,22 +124,23 @@ class GoalBabbling(Strategy):
             self.conclude(context, goal, outcomes, before, strategy)
 
     def conclude(self, context: Array, goal: Array, outcomes: list[Array], before: float, strategy: str) -> None:
-        """Tell the goal model the result of an attempt with these ``outcomes``, if it made a movement.
+        """Tell the goal model the result of an attempt, unless the attempt had no movement.
 
         Args:
+            outcomes: outcomes ``(outcome_dim,)`` of the attempt.
             before: competence at the goal when the attempt began.
             strategy: name of the strategy that chose the goal: "autonomous", "social" or another name.
         """
         if outcomes:
             judged, after = self.judge(context, goal, np.stack(outcomes)), self.competence(context, goal)
-            # A new exemplar that is nearer in (context, outcome) may be farther in outcome alone; this is no loss.
+            # The new nearest exemplar in (context, outcome) may be farther in outcome alone; this is no loss.
             gain = max(0.0, after - before)
-            if gain == 0 and judged != after:  # the judge saw the attempt alone, which may be worse than the memory
+            if gain == 0 and judged != after:  # the judge rates the attempt alone, which may be worse than the memory
                 gain = min(0.0, judged - before)
             self.goals.add(context, goal, judged, strategy, gain)
 
     def _explore(self, context: Array, goal: Array) -> Attempt:
-        """Endless movements, each by global exploration or by local optimisation."""
+        """Movements without end, each by global exploration or by local optimisation."""
         while True:
             if self.rng.random() < self._global_probability(context, goal):
                 # Deviation: the paper prints "theta in T", which must be Pi.
@@ -148,13 +149,13 @@ class GoalBabbling(Strategy):
                 yield from self._optimise(context, goal)
 
     def _global_probability(self, context: Array, goal: Array) -> float:
-        """Probability of global exploration: the farther the goal from all reached outcomes, the higher."""
+        """Probability of global exploration; the lower the competence at the goal, the higher."""
         if len(self.memory) == 0:
             return 1.0
-        share = self.explore.share  # looks for effects, so it is asked once
+        share = self.explore.share  # read once, because each read looks for effects
         if share is not None:
             return share
-        # Deviation: the paper's probability is -J itself. Here it stays off 0 and 1, so both regimes stay possible.
+        # Deviation: the paper's probability is -J. Here it is clipped, so that both regimes are always possible.
         return float(np.clip(-self.competence(context, goal), *self.global_range))
 
     def _optimise(self, context: Array, goal: Array) -> Attempt:
@@ -212,9 +213,9 @@ class Mimic(Social):
 
 
 class Imitate(Mimic):
-    """Imitates the demonstration, then tells the goal model the competence at its outcome, as in SGIM-D.
+    """Imitates the demonstration, then tells the goal model the competence at the demonstrated outcome, as in SGIM-D.
 
-    Section 3.2.3. A demonstration with an outcome outside T is imitated, but its outcome is no goal.
+    Section 3.2.3. If the demonstrated outcome lies outside T, the goal model is told nothing.
 
     Args:
         problem: problem to learn, with the goal babbling of the learner.
@@ -268,7 +269,7 @@ class Remember(Social):
 
 
 def _babbling(problem: Problem) -> GoalBabbling:
-    """Goal babbling of the learner, to which demonstrated goals are added."""
+    """The goal babbling of the learner, whose goal model is told about demonstrated goals."""
     if not isinstance(problem.autonomous, GoalBabbling):
         raise ValueError(f"a demonstrated goal needs goal babbling, got a {type(problem.autonomous).__name__}")
     return problem.autonomous

@@ -1,6 +1,6 @@
-"""Builds the documentation into site/: the pages of the repository and an API reference, by zensical.
+"""Build the documentation into site/ with zensical: the pages of the repository, and an API reference.
 
-Pages keep their places of the repository, so links work both on a code host and on the site; see `zensical.toml`.
+Pages keep their paths in the repository, so links work both on a code host and on the site; see `zensical.toml`.
 """
 
 import json
@@ -16,7 +16,7 @@ import sgimd_torch
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 COPIED = ("*.md", "LICENSE", "CITATION.cff", "docs/**/*", "results/**/*", "sgimd_torch/**/*.md", "sgimd_torch/**/*.xml")
-CHANGES = {  # what a code host reads, and what zensical reads in its place
+CHANGES = {  # patterns in a page for code hosts, and their replacements for zensical
     r"\]\(((?:\.\./)*)(sgimd_torch/[\w/]+)\.py\)": r"](\1api/\2.md)",  # a source file has an API page
     r"\.ipynb\)": r".md)",
     r"^```(\w+) ([\w./-]+)$": r'```\1 title="\2"',
@@ -55,7 +55,7 @@ def notebook(path: Path) -> str:
 
 
 def names() -> str:
-    """A table of what the package offers, with the first sentence of each docstring."""
+    """A table of the names that the package offers, with the first sentence of each docstring."""
     rows = ["# What `from sgimd_torch import` offers", "", "| name | what it is |", "| --- | --- |"]
     for name in sorted({*dir(sgimd_torch)} - {"__version__"}, key=str.lower):
         thing = getattr(sgimd_torch, name)
@@ -65,7 +65,7 @@ def names() -> str:
 
 
 def build(site: Path) -> int:
-    """Make the site, replacing an earlier one; the exit code is not 0 if pages have a fault, such as a broken link."""
+    """Make the site, in place of an earlier one; the exit code is not 0 if a page has a fault."""
     with TemporaryDirectory() as folder:
         shutil.copytree(HERE, folder, dirs_exist_ok=True)
         Path(folder, "sgimd_torch").symlink_to(ROOT / "sgimd_torch")

@@ -4,8 +4,8 @@ Section 5.1 of Nguyen & Oudeyer (2014). Every part is a keyword, so an ablation 
     learner = sgim_d(environment, seed, correspondence=environment.primitive.correspondence, goals=UniformGoals)
 A part is given as its constructor; `sgimd_torch.parts` describes each kind of part.
 
-Every algorithm copies the ``memory`` that it starts from. This may be the memory of another run, of another version of
-the robot, or of an ``observation`` learner that has watched all demonstrations.
+Every algorithm can start from a copy of a ``memory``: of another run, of another version of the robot, or of an
+``observation`` learner that has watched all demonstrations.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from sgimd_torch.parts import Problem, Social
 from sgimd_torch.searches.simplex import NelderMead
 from sgimd_torch.strategies import Babble, GoalBabbling, Imitate, Mimic, Remember, Rest
 
-# Deviation: the paper infers by eq. (9) alone, which is `LocalInverse`; `LocalProcess` has smaller errors.
+# Deviation: the paper infers by eq. (9) alone, which is `LocalInverse`; the default `LocalProcess` has smaller errors.
 
 
 def random_exploration(

@@ -1,7 +1,7 @@
 """Practice, our own algorithm: one movement for each goal within reach, the answer of a local process plus noise.
 
-Practice needs no unit and no knowledge of the robot. A movement that misses its goal corrects the answer there. If
-most movements do nothing, it first looks for movements with an effect, and then learns from these alone.
+No option depends on the units or on the robot. A movement that misses its goal corrects the inverse model there. If
+most movements have no effect, practice first looks for movements with an effect, and then learns from these alone.
     learner = practice(environment, seed)
 """
 

@@ -93,4 +93,4 @@ sgim_acts_search = partial(sgim_acts, **SEARCHING)
 sgim_im_search = partial(sgim_im, **SEARCHING)
 """SGIM-IM, as published: a search at each goal instead of practice."""
 sgim_eer = partial(sgim_im, goals=EntropyGoals)
-"""SGIM-IM; asks when a demonstration is expected to reduce entropy more than a movement of its own."""
+"""SGIM-IM; asks when a demonstration should reduce entropy more than the learner's own movement."""

@@ -1,11 +1,11 @@
-"""Rival by entropy: it asks when a demonstration is expected to reduce entropy more than its own movement.
+"""Rival by entropy: it asks when a demonstration is expected to reduce entropy more than the learner's own movement.
 
 After Kulak & Calinon (2023), "Combining social and intrinsically-motivated learning for multi-task robot skill
-acquisition". They compute the expected epistemic entropy over goals, and its expected reduction by each mode. The
-learner asks for a demonstration of the goal with the greatest epistemic entropy.
+acquisition". They compute the mean epistemic entropy of the policies for random goals, and its expected reduction by
+each strategy. The learner asks for a demonstration of the goal with the greatest epistemic entropy.
     learner = sgim_im(environment, seed, correspondence=..., teachers={"ann": ann}, goals=EntropyGoals)
-Here the policy for a goal is modelled as linear in features of the goal, so that reductions have a closed form. The
-nearest earlier attempt predicts where a movement of the learner itself would land.
+Here a Gaussian process models the policy for a goal, so that reductions have a closed form. The outcome of a strategy
+at a goal is predicted from the nearest earlier attempt of the strategy.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from sgimd_torch.inverses.gaussian_process import Kernel, one_thread, squared_di
 from sgimd_torch.parts import Problem
 from sgimd_torch.spaces import Array, Box
 
-_GOALS: Final = 30  # number of goals over which the expected entropy is a mean
-_KNOWN: Final = 400  # largest number of exemplars, spread over the memory, to which the Gaussian process is fitted
+_GOALS: Final = 30  # number of random goals over which entropy is averaged
+_KNOWN: Final = 400  # largest number of exemplars to which the Gaussian process is fitted
 _NOISE: Final = 0.1  # variance of the noise of one exemplar, in units of the prior variance
 _LENGTH: Final = 0.1  # length scale of the kernel, relative to the sides of C x T
 _KERNEL: Final = Kernel(1 / _LENGTH, 1.0, 0.0, _NOISE)
@@ -31,7 +31,7 @@ _KERNEL: Final = Kernel(1 / _LENGTH, 1.0, 0.0, _NOISE)
 
 @one_thread
 def doubt(known: Array, points: Array) -> Array:
-    """Posterior covariance of the policies for ``points``, by a Gaussian process from outcomes to policies.
+    """Posterior covariance of the policies for ``points``, by a Gaussian process from C x T to policies.
 
     Deviation: Kulak & Calinon take a Bayesian mixture of Gaussians.
 
@@ -60,11 +60,11 @@ class EntropyGoals(StrategicGoals):
         super().__init__(problem)
         self.memory, contexts, outcomes = problem.memory, problem.contexts, problem.outcomes
         self._box = Box(np.concatenate((contexts.low, outcomes.low)), np.concatenate((contexts.high, outcomes.high)))
-        self._tried: dict[str, list[tuple[Array, Array]]] = {}  # goal, outcome minus goal, relative to the sides
+        self._tried: dict[str, list[tuple[Array, Array]]] = {}  # goal, and outcome minus goal, in sides of C x T
 
     def choose(self, context: ArrayLike, costs: Mapping[str, float]) -> tuple[str, Array]:
-        """The strategy whose expected reduction of entropy, divided by its cost, is greatest, and a goal
-        ``(outcome_dim,)`` for this strategy.
+        """The strategy with the greatest expected reduction of entropy for its cost, and a goal ``(outcome_dim,)`` for
+        this strategy.
 
         Raises:
             ValueError: ``context`` is not one point of C.
@@ -88,7 +88,7 @@ class EntropyGoals(StrategicGoals):
     def add(
         self, context: ArrayLike, goal: ArrayLike, competence: float, strategy: str = AUTONOMOUS, gain: float = 0.0
     ) -> None:
-        """Remember where an attempt at a goal has landed; the outcome of this attempt is the last one in memory.
+        """Remember the goal and the outcome of an attempt; its outcome is the last one in memory.
 
         Raises:
             ValueError: see `Goals.add`.
@@ -97,13 +97,13 @@ class EntropyGoals(StrategicGoals):
         goals, last = (
             (point - self._box.low) / self._box.sides,
             self._scaled(self.memory.contexts, self.memory.outcomes),
-        )  # A request without a reply teaches nothing, as if the attempt had landed on an outcome that is known.
+        )  # A request without a reply (gain -1) teaches nothing, like an attempt whose outcome was known before.
         missed = np.full(len(point), np.nan) if gain == -1.0 else last[-1] - goals
         self._tried.setdefault(strategy, []).append((goals, missed))
 
     def _landing(self, points: Array, strategy: str) -> Array:
-        """Expected outcomes of attempts at ``points``: each misses its goal by as much as the nearest
-        earlier attempt of the strategy; before its first attempt, the strategy is expected to meet each goal."""
+        """Expected outcomes of attempts at ``points``: the difference from the goal is that of the nearest earlier
+        attempt of the strategy. A strategy without attempts is expected to meet each goal."""
         tried = self._tried.get(strategy)
         if not tried:
             return points

@@ -1,9 +1,8 @@
 """Progress of each strategy in each region of C x T, by which a strategy and its goal are drawn together.
 
 SGIM-ACTS: Nguyen & Oudeyer (2012), "Active choice of teachers, learning strategies and goals for a socially guided
-intrinsic motivation learner". The measure of progress follows later work of that group: Duminy, Nguyen & Duhaut (2019),
-"Learning a set of interrelated tasks by using a succession of motor policies for a socially guided intrinsically
-motivated learner".
+intrinsic motivation learner". The measure of progress is that of Duminy, Nguyen & Duhaut (2019), "Learning a set of
+interrelated tasks by using a succession of motor policies for a socially guided intrinsically motivated learner".
     goals = StrategicInterest(problem)
     strategy, goal = goals.choose(context, {"autonomous": 1.0, "imitate left": 2.0})      # names and costs
 """
@@ -26,10 +25,10 @@ from sgimd_torch.spaces import Array
 
 AUTONOMOUS: Final = "autonomous"
 _FEWEST, _LAST = 4, 10  # least and greatest number of attempts that a measure of progress uses
-# Share of the choices that first draw a goal from all of T, and then a strategy by its interest at this goal.
+# Probability that first a goal uniform in T is drawn, and then a strategy by its interest at this goal.
 _ANYWHERE: Final = 0.5
-_GREATEST: Final = 10  # number of pairs (region, strategy) with the greatest interest, of which one is drawn
-_TEMPERATURE: Final = 0.03  # rise of progress that makes interest e times as large
+_GREATEST: Final = 10  # number of pairs (region, strategy), those with the greatest interest, of which one is drawn
+_TEMPERATURE: Final = 0.03  # difference of progress for which interest is e times as large
 _UNTRIED: Final = 1.0  # progress of an untried strategy, the greatest possible
 
 
@@ -37,8 +36,8 @@ def progresses(competences: Array, gains: Array) -> Array:
     """Progress of each attempt: (after - before) * max(after, before)^2, with competences shifted from [-1, 0] to [0,
     1].
 
-    Deviation: ``after`` is the competence of the attempt itself. So progress is negative if the attempt is worse than
-    the memory. Only negative progress tells a mislabelling teacher from a teacher with nothing new.
+    Deviation: ``after`` is the competence of the attempt alone. So progress is negative if the attempt is worse than
+    the memory. Without negative progress, a mislabelling teacher would look like a teacher with nothing new.
     """
     return gains * (1 + competences + np.maximum(-gains, 0)) ** 2
 
@@ -71,14 +70,14 @@ class StrategicGoals(Goals):
 
 
 class StrategicInterest(StrategicGoals):
-    """Goals and strategies of most progress for their cost, for learners that ask teachers.
+    """Goals and strategies with the most progress for their cost, for learners that ask teachers.
 
     The interest of a pair (region, strategy) is e^(progress / temperature), divided by the cost of the strategy. If the
-    strategy has more progress there than the cheapest strategy, the difference is divided by the cost, too.
+    progress exceeds that of the cheapest strategy in the region, the excess is divided by the cost first.
 
-    The papers draw in proportion to progress, and try new strategies by chance. Here progress can be
-    negative, so interest is an exponential. If a strategy has few attempts in a region, its progress is estimated from
-    its nearest attempts. So strategies need not be tried at random.
+    The papers draw in proportion to progress, and sometimes draw a strategy at random. Here progress can be negative,
+    so interest is an exponential. If a strategy has few attempts in a region, its progress is estimated from its
+    nearest attempts, so no strategy has to be drawn at random.
 
     Args:
         problem: problem to learn.
@@ -96,8 +95,9 @@ class StrategicInterest(StrategicGoals):
         return self._map.regions
 
     def progress(self, region: Region, strategy: str) -> float:
-        """Progress of a strategy in a region, over its last ten attempts there. If there are fewer than 4, the ten
-        attempts nearest to the middle of the region count. With fewer than 4 in all, progress is 1, the greatest."""
+        """Progress of a strategy in a region, over its last ten attempts there. If there are fewer than 4, its ten
+        attempts nearest to the middle of the region count. A strategy with fewer than 4 attempts in all has progress 1,
+        the greatest possible."""
         tried = self._tried.get(strategy)
         if tried is None or len(tried.points) < _FEWEST:
             return _UNTRIED

@@ -3,7 +3,7 @@
 SGIM-IM and SGIM-ACTS, Nguyen & Oudeyer (2012): "Interactive learning gives the tempo to an intrinsically motivated
 robot learner", and "Active choice of teachers, learning strategies and goals for a socially guided intrinsic motivation
 learner". An attempt chooses a strategy and a goal together. If the strategy is to ask, the attempt requests a
-demonstration of the goal. At its end the goal model is told the competence at the goal and at the shown outcome.
+demonstration of the goal. The goal model is then told the competence at the goal and at the demonstrated outcome.
     StrategicBabbling(problem, babbling, {"imitate left": Asking("left", Mimic(problem), cost=2.0)})
 """
 
@@ -22,8 +22,8 @@ from sgimd_torch.strategies import GoalBabbling
 
 
 class Asking(NamedTuple):
-    """Strategy that asks: name of the teacher, social strategy for the demonstration, cost of a demonstration, and
-    number of movements for which the learner rests until the reply comes."""
+    """Strategy that asks: name of the teacher, social strategy that uses the demonstration, cost of a demonstration,
+    and number of movements for which the learner rests until the reply comes."""
 
     teacher: str
     answer: Social
@@ -63,8 +63,8 @@ class StrategicBabbling(Strategy):
     def attempt(self, context: Array) -> AskingAttempt:
         """Movements by one strategy for one goal; if the teacher has no reply, the movements are autonomous.
 
-        Deviation: competence is measured at the goal and at the demonstrated outcome, not at all outcomes on the way.
-        A mislabelling teacher shows good movements, but not for the goal of the request.
+        Deviation: competence is measured only at the goal and at the demonstrated outcome. The papers measure it at
+        every outcome of the attempt, by which a mislabelling teacher would look good.
         """
         strategy, goal = self.goals.choose(context, self.costs)
         if strategy == AUTONOMOUS:

@@ -62,7 +62,7 @@ class AnsweringTeacher(Demonstrator):
 
     Args:
         demonstrations: demonstrations to choose from.
-        rng: random stream of ``knows``; nothing is drawn later.
+        rng: random stream of ``knows``, which is called once.
         knows: function that chooses the demonstrations of this teacher: `everything`, `low_half`, `high_half`,
             `mislabelled`, or a function of your own.
         within: distance in C x T beyond which there is no reply.
@@ -102,7 +102,7 @@ high_half_teacher = partial(AnsweringTeacher, knows=high_half)
 mislabelling = partial(AnsweringTeacher, knows=mislabelled)
 """Has all demonstrations, but states a wrong outcome for each."""
 slow = partial(AnsweringTeacher, takes=10)
-"""Has all demonstrations; the learner rests 10 movements for each."""
+"""Has all demonstrations; the learner rests for 10 movements until the reply comes."""
 demonstrator_1 = partial(AnsweringTeacher, knows=partial(_recorded, 1))
 """Has the recordings of the rod's demonstrator 1."""
 demonstrator_2 = partial(AnsweringTeacher, knows=partial(_recorded, 2))
@@ -112,5 +112,5 @@ demonstrator_3 = partial(AnsweringTeacher, knows=partial(_recorded, 3))
 
 
 def middle(demonstrations: Sequence[Demonstration]) -> float:
-    """The median of the first outcome coordinate, where the halves meet."""
+    """The median of the first outcome coordinate, the border between the two halves."""
     return float(np.median([shown.outcome[0] for shown in demonstrations]))

@@ -1,1 +1,1 @@
-"""The board: curves and pictures of a run in TensorBoard. Needs tensorboardX."""
+"""The board of a run: curves and pictures in TensorBoard. Needs tensorboardX."""

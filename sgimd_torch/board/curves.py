@@ -1,6 +1,6 @@
-"""The curves of a board: numbers with a tag each, computed from episodes, evaluations and regions.
+"""The curves of a board: numbers by tag, computed from episodes, evaluations and regions.
 
-Interest and competence by region are those of section 3.2.1 of Nguyen & Oudeyer (2014).
+Section 3.2.1 of Nguyen & Oudeyer (2014) defines interest and competence of a region.
     behaviour = Behaviour(0.02); behaviour.episode(episode); behaviour.curves(); of_regions(interest_map.regions)
 """
 
@@ -16,12 +16,12 @@ from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.goals.regions import Region
 from sgimd_torch.spaces import Array, Episode
 
-DEPTH: Final = 3  # number of levels below the root of the tree of regions that have curves, so at most 15 curves
-_RECENT: Final = 50  # number of last goals that count
+DEPTH: Final = 3  # levels of the tree of regions, below its root, that have curves; so at most 15 regions have them
+_RECENT: Final = 50  # number of latest goals over which the curves of goals are computed
 
 
 class Behaviour:
-    """What the learner and its teachers do.
+    """Curves of what the learner and its teachers do.
 
     Args:
         tolerance: distance, in the unit of T, at which a goal counts as reached.
@@ -29,8 +29,8 @@ class Behaviour:
 
     def __init__(self, tolerance: float) -> None:
         self.tolerance = tolerance
-        self._since: Counter[str] = Counter()  # tag of a regime or strategy -> movements since the last point
-        self._imitated: list[float] = []  # distances of imitations since the last point
+        self._since: Counter[str] = Counter()  # number of movements since the last point, by tag
+        self._imitated: list[float] = []  # distances missed by imitations since the last point
         self._goal: Array | None = None
         self._missed_by: deque[float] = deque(maxlen=_RECENT)  # smallest distance for each goal
         self._demonstrations = self._answered = 0
@@ -57,10 +57,10 @@ class Behaviour:
             self._missed_by[-1] = min(distance, self._missed_by[-1])
 
     def curves(self) -> dict[str, float]:
-        """Shares and means since the last call, and counts since the first movement."""
+        """Values of the curves by tag: shares and means since the last call, counts since the first movement."""
         total = sum(n for tag, n in self._since.items() if tag.startswith("regime/"))
         values = {tag: n / total for tag, n in self._since.items()}
-        self._since = Counter(dict.fromkeys(self._since, 0))  # a regime that was seen once keeps its curve
+        self._since = Counter(dict.fromkeys(self._since, 0))  # known tags keep their curves, at 0
         values["teacher/demonstrations"] = self._demonstrations
         if any(tag.startswith("strategy/") for tag in values):
             values["teacher/replies"] = self._answered
@@ -75,7 +75,7 @@ class Behaviour:
 
 
 def of_evaluation(found: Evaluation, near: float) -> dict[str, float]:
-    """Errors of an evaluation, and the share of the goals that are met, with an error of at most ``near``."""
+    """Values of the curves of an evaluation by tag; a goal with an error of at most ``near`` counts as met."""
     return {
         "error/mean": found.mean_error,
         "error/median": float(np.median(found.errors)),
@@ -87,9 +87,9 @@ def of_evaluation(found: Evaluation, near: float) -> dict[str, float]:
 
 
 def of_regions(regions: Sequence[Region]) -> dict[str, float]:
-    """Mean competence and mean interest of each node of the tree of regions, over the goals that its regions remember.
+    """Mean competence and mean interest, by tag, of each node of the tree whose leaves are ``regions``.
 
-    The ``regions`` are the leaves of the tree. A node without goals has no curve.
+    The means are over the remembered goals of all leaves below the node. A node without goals has no curve.
     """
     values: dict[str, float] = {"regions/count": len(regions)} if regions else {}
     for path, leaves in branches(regions).items():
@@ -101,9 +101,9 @@ def of_regions(regions: Sequence[Region]) -> dict[str, float]:
 
 
 def branches(regions: Sequence[Region]) -> Mapping[str, list[Region]]:
-    """The leaves below each node of the tree of regions, down to level ``DEPTH``, by the node's path; paths are sorted.
+    """The leaves below each node of the tree of regions, by the path of the node; deepest nodes are at level ``DEPTH``.
 
-    The cells of a `ProgressGrid`, such as "R.3.7", lie below "R" alone.
+    The cells of a `ProgressGrid`, such as "R.3.7", form no tree: "R" is their only node.
     """
     found: dict[str, list[Region]] = {}
     for region in regions:

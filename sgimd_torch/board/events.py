@@ -2,8 +2,8 @@
 
     file = EventFile(folder); file.add(50, summary.scalar("error/mean", 0.2)); file.begin(); file.close()
 
-``summary`` is ``tensorboardX.summary``. Its `SummaryWriter` writes in a thread, where a full disk would not stop
-the run, so this module uses the `EventsWriter` on which `SummaryWriter` is built.
+``summary`` is ``tensorboardX.summary``. This module uses tensorboardX's `EventsWriter`, not its `SummaryWriter`: that
+class writes in a thread, so a full disk would not stop the run.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ class EventFile:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        # A TensorBoard that is open drops the points of earlier files when it reads this event.
+        # An open TensorBoard drops the points of earlier files when it reads this event.
         self._waiting = [Event(session_log=SessionLog(status=SessionLog.START))]
         self._writer: EventsWriter | None = None
 
     def begin(self) -> None:
-        """Write the waiting summaries into a new file, then remove the earlier files.
+        """Write the waiting summaries to a new file, then remove the earlier files.
 
-        The new file has a name of its own, because a TensorBoard that is open does not read a known name again.
+        The new file has a new name, because an open TensorBoard does not read a file of a known name again.
 
         Raises:
             OSError: the folder cannot be written.
@@ -43,7 +43,7 @@ class EventFile:
             path.unlink(missing_ok=True)
 
     def add(self, step: int, summary: Summary) -> None:
-        """Add values at a step; before ``begin`` they wait in memory."""
+        """Add a summary at a step; before ``begin`` it waits in memory."""
         event = Event(step=step, wall_time=time.time(), summary=summary)
         if self._writer is None:
             self._waiting.append(event)
@@ -51,7 +51,7 @@ class EventFile:
             self._writer.write_event(event)
 
     def flush(self) -> None:
-        """Bring everything to the disk; nothing happens before ``begin``."""
+        """Bring all written summaries to the disk; before ``begin``, do nothing."""
         if self._writer is not None:
             self._writer.flush()
 

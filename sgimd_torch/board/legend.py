@@ -1,4 +1,4 @@
-"""What each tag of the board means."""
+"""The meaning of each tag of the board."""
 
 from __future__ import annotations
 
@@ -10,33 +10,33 @@ LEGEND: Final[Mapping[str, str]] = {
     "error/mean": "Mean distance UNIT, over the benchmark goals, from a goal to the outcome of the movement for it, "
     "eq. (10).",
     "error/median": "Median distance UNIT from a benchmark goal to the outcome of the movement for it.",
-    "error/p90": "90th percentile of the distances UNIT from the benchmark goals to their outcomes.",
-    "error/failed": "Movements of the evaluation that failed. The error is then the distance from goal to rest.",
+    "error/p90": "90th percentile of the distance UNIT from a benchmark goal to the outcome of the movement for it.",
+    "error/failed": "Number of movements of the evaluation that failed. A failed movement counts as rest.",
     "error/noise_floor": "Part UNIT of error/mean that motor noise alone makes.",
-    "error": "Mean error UNIT if another inverse model answers. All runs have by_linear, so this curve compares "
-    "learners without the influence of their inverse models.",
-    "competence": "Mean competence of the goals that a region remembers: 0 is met, -1 no better than rest. R is all of "
-    "C x T, R0 and R1 are its two parts, R01 is a part of R0; map/competence shows them. Other runs have other "
-    "regions. After a cut of the region, the curve is the mean over the goals of its parts.",
+    "error": "Mean error UNIT with the inverse model that the tag names, in place of the learner's own. All runs have "
+    "error/by_linear, which compares what the learners remember, whatever their inverse models are.",
+    "competence": "Mean competence of the goals that a region remembers: 0 is a goal that is met, -1 an outcome no "
+    "better than rest. R is all of C x T, R0 and R1 are its two parts, R01 is a part of R0; map/competence shows the "
+    "regions. Each run has its own regions. After a cut of a region, its curve is the mean over its parts' goals.",
     "interest": "Recent change of competence in a region, eq. (3). The learner draws more goals where interest is "
-    "high. After a cut of the region, the curve is the mean over the goals of its parts.",
+    "high. After a cut of a region, its curve is the mean over its parts' goals.",
     "regions": "Number of regions of the goal model.",
-    "regime": "Share of the last movements by origin: global exploration, local optimisation, imitation, babbling or "
-    "rest; failed is the share of movements that failed.",
-    "goals/met": "Share of the benchmark goals that are met: their error is half the side of a tile or less.",
+    "regime": "Share of each kind of movement since the last point: global exploration, local optimisation, imitation, "
+    "babbling, rest, or failed movements.",
+    "goals/met": "Share of the benchmark goals whose error is at most half the side of a benchmark tile.",
     "goals/reached": "Share of the last 50 goals that a movement reached within the tolerance.",
-    "goals/missed_by": "Distance UNIT from a goal to its nearest outcome, median over the last 50 goals.",
+    "goals/missed_by": "Median over the last 50 goals of the distance UNIT from a goal to its nearest outcome.",
     "teacher/demonstrations": "Number of demonstrations so far.",
     "teacher/replies": "Number of requests so far that a teacher replied to with a demonstration.",
-    "teacher/missed_by": "Distance UNIT from a demonstrated outcome to the outcome of an imitation, mean over the last "
-    "imitations.",
-    "strategy": "Share of the last movements before which the learner asked by this strategy.",
-    "model/relative_error": "Error for exemplars that training left out, relative to the error of always predicting "
-    "their mean; 1 is no better than that.",
+    "teacher/missed_by": "Mean distance UNIT from a demonstrated outcome to the outcomes of its imitations, since the "
+    "last point.",
+    "strategy": "Share of the movements since the last point before which the learner asked by this strategy.",
+    "model/relative_error": "Prediction error for exemplars that training left out, divided by the error of predicting "
+    "their mean outcome. A useless model has 1.",
     "model/held_out": "Negative log likelihood of exemplars that training left out; lower is better.",
     "model/steps": "Steps of the optimiser at the last refresh.",
-    "model/error": "Mean distance UNIT from the newest outcomes to what the model predicted before it learnt them.",
-    "model/coverage": "Share of the newest outcomes in the 80 % region of their prediction.",
+    "model/error": "Mean distance UNIT from the newest outcomes to their predictions before training on them.",
+    "model/coverage": "Share of the newest outcomes that lie in the 80 % regions of their predictions.",
     "time": "Time (s) spent so far, by part of the run. Replayed movements have no times.",
     "map/competence": "Regions, named as in the curves, coloured by the mean competence of the goals they remember.",
     "map/error": "Benchmark goals, coloured by their error at this evaluation.",
@@ -49,11 +49,11 @@ def sentence(tag: str, unit: str) -> str:
 
 
 def page(unit: str) -> str:
-    """The meaning of all tags, in markdown. A list, because TensorBoard breaks tags in a table in the middle."""
+    """The meaning of all tags, in Markdown; a list, because TensorBoard would break the tags of a table."""
     lines = [f"- **{tag}{'' if '/' in tag else '/...'}** {meaning}" for tag, meaning in LEGEND.items()]
     return in_unit("Steps are movements.\n\n" + "\n".join(lines), unit)
 
 
 def in_unit(text: str, unit: str) -> str:
-    """A text of this file, with the ``unit`` of T; "" stands for no unit."""
+    """A text of ``LEGEND`` with the ``unit`` of T in place of UNIT; "" stands for no unit."""
     return text.replace(" UNIT", f" ({unit})" if unit else "")

@@ -1,6 +1,6 @@
-"""The board of a run: what TensorBoard shows of it. Steps are movements.
+"""A listener that writes the board of a run for TensorBoard. Steps are movements.
 
-A resumed run tells its listeners all of its record again, so the board is written anew and holds each point once.
+A resumed run first tells its listeners its whole record. So the board is written anew, and holds each point once.
     board = BoardListener(folder, parts, seconds); board.episode(episode, replayed=False); board.flush(); board.close()
 ``tensorboard --logdir RUNS`` shows it.
 """
@@ -28,13 +28,13 @@ METRIC: Final = "error/mean"  # tag of the result on TensorBoard's page of hyper
 
 
 class BoardListener(EventFile):
-    """Writes the curves and pictures of a run.
+    """A listener that writes the curves and pictures of a run.
 
     Args:
-        folder: folder of the run; its event files stay as they are until ``begin``, the end of a replay.
-        parts: parts of the run, of which config, environment, learner and benchmark are used.
+        folder: folder of the run; its event files do not change before ``begin``, the end of a replay.
+        parts: parts of the run; only config, environment, learner and benchmark are used.
         seconds: function that returns the seconds spent so far, by part of the run.
-        curves: function that returns new numbers of other listeners, by tag.
+        curves: function that returns the new numbers of other listeners for the board, by tag.
     """
 
     def __init__(
@@ -51,12 +51,12 @@ class BoardListener(EventFile):
         self._behaviour = Behaviour(parts.learner.problem.tolerance)
         self._movements = self._drawn_at = 0
         self._explained: set[str] = set()
-        for each in summary.hparams(hparams_of(parts.config), {METRIC: math.nan})[:2]:  # the third reports the end
+        for each in summary.hparams(hparams_of(parts.config), {METRIC: math.nan})[:2]:  # the third marks the end
             self.add(0, each)
         self.add(0, summary.text("about/legend", page(self._space.unit)))
 
     def episode(self, episode: Episode, replayed: bool) -> None:
-        """Count a movement; every 50th movement gives the curves a point. Replayed movements have no times."""
+        """Count a movement; after every 50th movement the curves get a point. Replayed movements have no times."""
         self._movements = episode.index + 1
         self._behaviour.episode(episode)
         if self._movements % EVERY == 0:
@@ -66,10 +66,10 @@ class BoardListener(EventFile):
         self._scalars(self._curves())
 
     def evaluated(self, movements: int, found: Mapping[str, Evaluation]) -> None:
-        """Show an evaluation; for inverse models other than the run's own, show only the mean error.
+        """Show an evaluation; of inverse models other than the run's own, show only the mean error.
 
-        Pictures take as long as 100 movements, so they are drawn when the number of movements has doubled, and at the
-        end.
+        Pictures take as long as 100 movements. So they are drawn only when the number of movements has doubled since
+        the last pictures, and at the end.
         """
         own, goals = found["own"], self._benchmark.goals
         others = {f"error/by_{answer}": each.mean_error for answer, each in found.items() if answer != "own"}
@@ -80,17 +80,17 @@ class BoardListener(EventFile):
                 self._show(tag, summary.image(tag, picture, dataformats="HWC"), "images")
 
     def curves(self) -> Mapping[str, float]:
-        """Nothing, because the board draws the numbers of other listeners."""
+        """No numbers, because the board only draws those of other listeners."""
         return {}
 
     def _scalars(self, values: Mapping[str, float]) -> None:
-        """A point for each curve, by tag; values that are not finite are left out."""
+        """Add a point to each curve; ``values`` are by tag, and values that are not finite are left out."""
         for tag, value in values.items():
             if math.isfinite(value):
                 self._show(tag, summary.scalar(tag, value), "scalars")
 
     def _show(self, tag: str, made: Any, plugin: str) -> None:
-        """Add a summary ``made`` for TensorBoard's page ``plugin``; the first summary of a tag explains the tag."""
+        """Add a summary to TensorBoard's page ``plugin``; the first summary of a tag carries the tag's explanation."""
         if tag not in self._explained:
             self._explained.add(tag)
             made.value[0].metadata.summary_description = sentence(tag, self._space.unit)
@@ -99,10 +99,10 @@ class BoardListener(EventFile):
 
 
 def hparams_of(config: Any) -> dict[str, bool | float | str]:
-    """Options that tell a run from others, for TensorBoard's page of hyperparameters, by their names on a command line.
+    """Options of a run for TensorBoard's page of hyperparameters, by their names on the command line.
 
-    These are algorithm, environment, seed, options of parts that differ from their defaults, and options in the name of
-    a variant, such as "sgim-d,budget=5". So each run of a sweep has all options that the sweep varies.
+    These are algorithm, environment, seed, options of parts that differ from their defaults, and the options in the
+    name of the variant, such as "sgim-d,budget=5". So each run of a sweep has all options that the sweep varies.
     """
     varied = re.findall(r"(?:^|,)([\w.-]+)=", config.variant)
     typed = {name.replace("_", "-"): value for name, value in config.settings.items()}

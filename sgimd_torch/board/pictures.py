@@ -22,21 +22,21 @@ from sgimd_torch.figures.sections import Section, sections
 from sgimd_torch.goals.regions import Region
 from sgimd_torch.spaces import Array, Box
 
-SHARE: Final = 0.15  # error at the end of the colours, as a share of T's longest side; it is the same for all runs
-NARROW: Final = 0.2  # share of the picture's side; the name of a narrower region is turned by 90 degrees
+SHARE: Final = 0.15  # error of the last colour, as a share of T's longest side; constant, so that runs can be compared
+NARROW: Final = 0.2  # share of the width of the map; the name of a narrower region is turned by 90 degrees
 WIDE: Final = 2.5  # width (inches) of the axes of a picture, without the colour bar
 MARGIN: Final = 0.7  # height (inches) of the space above and below the axes together
 STYLE: Any = {"font.size": 10, "axes.titlesize": 10}  # sizes that are readable on the page Time Series
 
 
 def draw(regions: Sequence[Region], space: Box, goals: Array, errors: Array) -> dict[str, NDArray[np.uint8]]:
-    """The pictures ``(height, width, 4)`` by tag; if T has more than two dimensions, they show pairs side by side.
+    """Pictures ``(height, width, 4)`` by tag; if T has more than two dimensions, each picture shows several sections.
 
     Args:
-        regions: regions of the goal model; without regions, there is no picture of them.
+        regions: regions of the goal model; if empty, there is no picture of them.
         space: T.
         goals: ``(n, outcome_dim)`` goals of the benchmark.
-        errors: ``(n,)``, in the unit of T.
+        errors: ``(n,)`` errors of the goals, in the unit of T.
     """
     pictures: dict[str, Callable[[Axes, Section], object]] = {}
     pictures["map/error"] = lambda ax, section: _errors(ax, goals, errors, space, section)
@@ -73,7 +73,7 @@ def _competence(ax: Axes, regions: Sequence[Region], section: Section) -> None:
 
 
 def _pixels(picture: Callable[[Axes, Section], object], shown: Sequence[Section]) -> NDArray[np.uint8]:
-    """A picture with its sections side by side, as large as TensorBoard shows it."""
+    """The pixels of a picture with its sections side by side, as large as TensorBoard shows it."""
     size = (4.2 * len(shown), shown[0].height(WIDE) + MARGIN)
     with rc_context(STYLE):
         figure = Figure(size, dpi=120, layout="constrained")

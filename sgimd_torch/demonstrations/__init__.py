@@ -1,10 +1,10 @@
 """Demonstrations on disk: recorded joint trajectories, their times and outcomes.
 
-They lie in one ``.npz`` file without pickle. The n recordings may differ in length, and follow each other:
+One ``.npz`` file without pickle holds n recordings, one after another. They may differ in length:
     version          ()                   1
     lengths          (n,) int             number of samples of each recording, at least 2
-    times            (sum,) s             increasing within each recording
-    trajectories     (sum, n_joints) rad
+    times            (sum of lengths,) s  increasing within each recording
+    trajectories     (sum of lengths, n_joints) rad
     outcomes         (n, outcome_dim) m   landing points of the float
     contexts         (n, context_dim)     (n, 0) in the fishing task
 ``save_demonstrations`` writes such a file from a list of ``Demonstration``.
@@ -56,11 +56,11 @@ def load_demonstrations(
 
     Args:
         path: ``.npz`` file in the format above.
-        n_joints, outcome_dim, context_dim: dimensions of the robot; None accepts any number.
+        n_joints, outcome_dim, context_dim: required dimensions; None accepts any number.
 
     Raises:
         ValueError: the file has another format, is empty or truncated, has times that do not increase or numbers
-            that are not finite, or is for another robot; the message names the file and the recording.
+            that are not finite, or has other dimensions; the message names the file and the recording.
         OSError: there is no file, or it is a directory.
     """
     source = str(path)

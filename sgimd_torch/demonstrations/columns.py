@@ -1,4 +1,4 @@
-"""Recordings from tables: each row holds a sample, and the user names the columns.
+"""Recordings from tables: each row is a sample of a recording, and the user names the columns.
 
     columns = Columns(joints=("shoulder", "elbow"), outcome=("x", "y"))
     shown = read_csv("recordings", columns)              # a folder with a file for each recording, or one long table
@@ -29,12 +29,12 @@ class Columns:
     """Names of the columns of a table.
 
     Args:
-        joints: columns of joint angles (rad) or commands, in the order that the robot's correspondence expects.
+        joints: columns of joint angles (rad) or of motor commands, in the order of the robot's correspondence.
         outcome: columns of the outcome, read in the last row of a recording.
         context: columns of the context, read in the first row of a recording; () for a robot without contexts.
-        time: column of the time (s); a recording may begin at any time.
-        recording: column with the number or name of the recording of a row; None if a table is one recording.
-        degrees: whether the table has joints in degrees; they are then converted to rad.
+        time: column of the time (s); the first time of a recording counts as 0.
+        recording: column with the number or name of the recording of each row; None: a table is one recording.
+        degrees: whether joint angles in the table are in degrees; they are converted to rad.
     """
 
     joints: tuple[str, ...]
@@ -53,13 +53,13 @@ class Columns:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All columns, as the user wrote them."""
+        """All columns as the user wrote them, with entries in brackets."""
         grouped = () if self.recording is None else (self.recording,)
         return (*self.joints, *self.outcome, *self.context, self.time, *grouped)
 
     @property
     def plain(self) -> list[str]:
-        """All columns, each once, without the entries in brackets."""
+        """All columns, each once, without entries in brackets."""
         return list(dict.fromkeys(name.partition("[")[0] for name in self.names))
 
 
@@ -69,8 +69,8 @@ def read_csv(path: str | os.PathLike[str], columns: Columns) -> list[Demonstrati
     The first line of a file names its columns. A file is one recording unless ``columns.recording`` divides it.
 
     Raises:
-        ValueError: a column is missing, a field is no number, or rows make no recording; the message names the file and
-            the row or recording.
+        ValueError: a column is missing, a field is not a number, or `recordings` refuses the rows; the message names
+            the file, and the row or recording.
         OSError: there is no file.
     """
     path = Path(path)
@@ -84,8 +84,8 @@ def recordings(source: str, table: Mapping[str, np.ndarray], columns: Columns) -
     """The recordings of one table.
 
     Args:
-        source: name of the table in errors.
-        table: ``(n_rows,)`` values or ``(n_rows, k)`` vectors of each of ``columns.plain``.
+        source: name of the table in error messages.
+        table: ``(n_rows,)`` values or ``(n_rows, k)`` vectors for each name in ``columns.plain``.
         columns: meaning of the columns.
 
     Raises:
@@ -110,7 +110,7 @@ def recordings(source: str, table: Mapping[str, np.ndarray], columns: Columns) -
 
 
 def _table(file: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
-    """Columns of a CSV file, as text."""
+    """Columns of a CSV file, as arrays of text."""
     with open(file, encoding="utf-8-sig", errors="replace", newline="") as text:
         lines = text.readlines()
     if any("\0" in line for line in lines):
@@ -149,7 +149,7 @@ def _values(source: str, table: Mapping[str, np.ndarray], names: Sequence[str]) 
 
 
 def _groups(source: str, table: Mapping[str, np.ndarray], recording: str | None, n: int) -> list[tuple[str, slice]]:
-    """For each recording, in order, its name for error messages and its rows."""
+    """Pairs (name for error messages, rows), one for each recording, in order."""
     if recording is None:
         return [(source, slice(0, n))]
     names = table[recording].tolist()

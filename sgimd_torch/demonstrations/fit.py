@@ -1,6 +1,6 @@
-"""Whether a demonstration fits a robot: its distance from the played movement, and the limits that it exceeds.
+"""How well a robot can repeat a demonstration: the misfit of eq. (6), and the limits that the demonstration exceeds.
 
-Eq. (6) of Nguyen & Oudeyer (2014).    misfit_of(rod, theta_d, shown); beyond_limits(rod, shown)
+The equation is that of Nguyen & Oudeyer (2014).    misfit_of(rod, theta_d, shown); beyond_limits(rod, shown)
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from sgimd_torch.spaces import Array, Demonstration
 
 
 def misfit_of(environment: Environment, theta: Array, shown: Demonstration) -> float:
-    """d of eq. (6): root mean square difference, over time and joints, of played and recorded angles (rad) or commands.
+    """Distance d of eq. (6): root mean square of played minus recorded angles (rad) or commands, over times and joints.
 
     Args:
         environment: robot that plays theta; the misfit is NaN if the robot has no primitive.
         theta: ``(theta_dim,)`` policy that the correspondence gives for the recording.
-        shown: the recording.
+        shown: demonstration with the recording.
     """
     played = primitive_of(environment).at(theta, shown.times - shown.times[0])
     if played is None or played.shape != shown.trajectory.shape:
@@ -26,7 +26,7 @@ def misfit_of(environment: Environment, theta: Array, shown: Demonstration) -> f
 
 
 def beyond_limits(environment: Environment, shown: Demonstration) -> list[str]:
-    """A sentence for each known limit of the robot that a recording exceeds."""
+    """Sentences, one for each limit of the robot that a recording exceeds."""
     remarks, primitive = list[str](), primitive_of(environment)
     box = primitive.ranges
     if box is not None and shown.trajectory.ndim == 2 and shown.trajectory.shape[1] == box.dim:

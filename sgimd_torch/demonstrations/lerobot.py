@@ -1,10 +1,10 @@
-"""Recordings from a LeRobot dataset on disk, format v3: several episodes in a parquet file; videos are not read.
+"""Recordings from a LeRobot dataset (format v3) on disk; videos are not read.
 
     columns = Columns(joints=("observation.state[0:6]",), outcome=("observation.environment_state[0:2]",),
                       time="timestamp", recording="episode_index")
     shown = read_lerobot("datasets/my_arm", columns)
-Format v3 has ``meta/info.json`` with the version, the counts and the features, and ``data/chunk-000/file-000.parquet``
-and so on with a row for each frame.
+``meta/info.json`` has the version, the counts and the features. ``data/chunk-000/file-000.parquet`` and further files
+have a row for each frame; one file may hold several episodes.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ def read_lerobot(root: str | os.PathLike[str], columns: Columns) -> list[Demonst
 
     Args:
         root: folder of the dataset, with ``meta`` and ``data``.
-        columns: names of the features; ``time`` is usually ``timestamp``, ``recording`` usually ``episode_index``.
+        columns: names of features; usually the time is ``timestamp``, and the recording is ``episode_index``.
 
     Raises:
-        ValueError: no dataset, another version, a missing feature, another number of episodes or frames than
-            ``info.json`` says, or an episode that is no recording.
+        ValueError: the folder is no dataset, has another version, lacks a feature, has not as many episodes and frames
+            as ``info.json`` says, or has an episode that `recordings` refuses.
         OSError: a file cannot be read.
     """
     root = Path(root)
@@ -72,7 +72,7 @@ def _info(path: Path) -> dict[str, Any]:
 
 
 def _columns(file: Path, names: list[str]) -> dict[str, np.ndarray]:
-    """``(n_rows,)`` values or ``(n_rows, k)`` vectors of each name."""
+    """Columns of a parquet file by name, as ``(n_rows,)`` values or ``(n_rows, k)`` vectors."""
     try:
         table = pyarrow.parquet.read_table(file, columns=names, page_checksum_verification=True)
         return {name: np.array(table.column(name).to_pylist()) for name in names}

@@ -1,6 +1,6 @@
-"""A check whether an environment keeps each promise of `Environment`; it names each broken promise and a likely cause.
+"""A check of an environment: does it keep every promise of the protocol `Environment`?
 
-check_environment(Toss())        # ValueError with a line for each broken promise; ``sgimd check toss:Toss`` prints it
+check_environment(Toss())    # raises ValueError with a line for each broken promise; the command is ``sgimd check``
 """
 
 from __future__ import annotations
@@ -14,20 +14,20 @@ import numpy as np
 from sgimd_torch.environments.protocol import BatchEnvironment, Environment, check_instance, check_robot
 from sgimd_torch.spaces import Array, Box, check_count, stream
 
-_FACTOR: Final = 10.0  # largest ratio between announced and measured noise; a wrong unit gives a larger ratio
+_FACTOR: Final = 10.0  # largest accepted ratio between announced and measured noise; a wrong unit exceeds it
 Movements = Sequence[tuple[Array, Array]]
 
 
 def check_environment(environment: Environment, *, movements: int = 3) -> None:
-    """Refuse an environment that breaks a promise of its protocol.
+    """Refuse an environment that breaks a promise of the protocol `Environment`.
 
     Args:
-        environment: environment to check; it is observed and executed about 8 times for each movement.
-        movements: number of random movements to try, besides two corners of Pi.
+        environment: environment to check; its methods are called about 8 times for each movement.
+        movements: number of random movements to try; two corners of Pi are tried, too.
 
     Raises:
-        ValueError: a promise is broken; a line for each says what was found, what was expected, and the likely cause.
-            Promises that depend on a broken promise are not checked, so a second check may find more.
+        ValueError: a promise is broken. The message has a line for each broken promise: what was found, what was
+            expected, and the likely cause. Promises that depend on a broken promise are not checked.
     """
     check_count("movements", movements, 1)
     if isinstance(environment, type):
@@ -49,7 +49,7 @@ def check_environment(environment: Environment, *, movements: int = 3) -> None:
 
 
 class _RaisedError(Exception):
-    """A member of the environment raised an error where none is allowed."""
+    """A method of the environment raised an exception where none is allowed."""
 
 
 def _movements(environment: Environment, n: int) -> Movements:
@@ -122,7 +122,7 @@ def _repeats(environment: Environment, tried: Movements) -> Iterator[str]:
     context, theta = tried[0]
     before, rng = _global_streams(), stream(1, "execute")
     untouched = rng.bit_generator.state
-    _call(environment, "execute", context, theta, stream(1, "execute"))  # the next two then follow an equal call
+    _call(environment, "execute", context, theta, stream(1, "execute"))  # the next two calls then both follow this one
     first = _call(environment, "execute", context, theta, rng)
     kept, again = first.copy(), _call(environment, "execute", context, theta, stream(1, "execute")).copy()
     if _global_streams() != before:
@@ -182,7 +182,7 @@ def _batches(environment: Environment, tried: Movements) -> Iterator[str]:
     if not np.array_equal(together, kept):
         yield _used_twice("execute_many()")
     if not np.array_equal(last, kept[-1:]):
-        yield "a row of execute_many() depends on other rows of its batch; must all movements have one length?"
+        yield "a row of execute_many() depends on other rows of its batch; does the longest movement set their length?"
 
 
 def _refusals(environment: Environment, tried: Movements) -> Iterator[str]:
@@ -205,7 +205,7 @@ def _refusals(environment: Environment, tried: Movements) -> Iterator[str]:
 
 
 def _invalid(point: Array, box: Box) -> list[Array]:
-    """Points of another length, a batch, and points with a last entry that is NaN, infinite or outside ``box``."""
+    """Values that are not one point of ``box``: another length, two points, and entries NaN, infinite or outside."""
     values = [np.append(point, 0.0), np.stack((point, point))]
     if len(point) > 0:
         outside = box.high[-1] + box.sides[-1]
@@ -216,7 +216,7 @@ def _invalid(point: Array, box: Box) -> list[Array]:
 def _call(environment: Environment, name: str, *arguments: Any) -> Any:
     try:
         return getattr(environment, name)(*arguments)
-    except (Exception, SystemExit) as error:  # whatever the user's code does
+    except (Exception, SystemExit) as error:  # code of the user may raise anything
         given = f" for theta {_text(arguments[1])}" if name == "execute" else ""
         raise _RaisedError(f"{name}() raised {type(error).__name__}{given}: {error}") from error
 

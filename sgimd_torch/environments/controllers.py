@@ -1,7 +1,7 @@
 """Controllers turn a theta into a sequence of commands; the controller here plays a sinusoid for each command.
 
 A controller has ``policies``, its Pi, and ``at(theta, times)``, the commands. `GaussianPrimitive` has both, too, so it
-can replace `Sinusoids`. Both classes translate a recording by ``correspondence``, eq. (6) of Nguyen & Oudeyer (2014).
+can replace `Sinusoids`. ``correspondence`` of both translates a recording to theta, eq. (6) of Nguyen & Oudeyer (2014).
     swim = Sinusoids(actions, frequencies=(0.2, 2.0)); commands = swim.at(theta, times)
 """
 
@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from sgimd_torch.environments.protocol import Primitive, check_recording
 from sgimd_torch.spaces import Array, Box
 
-_GRID: Final = 200  # number of frequencies to try; the best frequency is then refined
+_GRID: Final = 200  # number of frequencies that the fit tries before it refines the best of them
 STEER: Final = 0.5  # largest offset, relative to half the range of the command
 
 
@@ -37,14 +37,14 @@ class Sinusoids(Primitive):
 
     theta in [0, 1]^(3 n_commands + 1) holds amplitude, phase and offset command by command, then the frequency. An
     amplitude of 1 is half the range of the command; an offset moves the middle by at most a quarter of the range.
-    Commands are clipped to their ranges. The phases 0 and 1 are equal.
+    Commands are clipped to their ranges. The phases 0 and 1 give equal commands.
 
     Args:
         commands: ``(n_commands,)`` box of the ranges of the commands, such as the torques of motors.
         frequencies: lowest and highest frequency (Hz).
 
     Raises:
-        ValueError: frequencies that do not satisfy 0 < lowest < highest.
+        ValueError: the frequencies do not satisfy 0 < lowest < highest.
     """
 
     def __init__(self, commands: Box, frequencies: tuple[float, float]) -> None:
@@ -63,17 +63,17 @@ class Sinusoids(Primitive):
         return self.commands.clip((low + high) / 2 + (high - low) / 2 * waves)
 
     def correspondence(self, times: ArrayLike, trajectory: ArrayLike) -> Array:
-        """theta_d, the policy whose commands come nearest to the recorded ones, eq. (6).
+        """theta_d, the policy whose commands come nearest to the recorded commands, eq. (6).
 
-        The frequency is the best of a grid, then refined; for a fixed frequency the fit is linear. The fit is exact if
-        no command was clipped.
+        The fit takes the best frequency of a grid and refines it; for a fixed frequency the fit is linear. The fit is
+        exact if no command was clipped.
 
         Args:
             times: ``(n_times,)`` s, increasing.
             trajectory: ``(n_times, n_commands)``, the commands at ``times``.
 
         Raises:
-            ValueError: shapes that do not fit, values that are not finite, or unsorted times.
+            ValueError: shapes do not fit, values are not finite, or times are not sorted.
         """
         from scipy.optimize import minimize_scalar
 

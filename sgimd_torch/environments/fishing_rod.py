@@ -1,8 +1,8 @@
 """The fishing rod: a six-joint arm casts a float on the water, simulated by MuJoCo.
 
-Section 4 of Nguyen & Oudeyer (2014); the model is ``fishing_rod.xml``. A movement is open loop, so all its commands,
-noise included, are computed first, and then ``rod_physics.py`` simulates them. If the float has not met the water
-``HOLD`` seconds after the end of the movement, the line is let out.
+Section 4 of Nguyen & Oudeyer (2014); the model is ``fishing_rod.xml``. A movement is open loop: all its commands, noise
+included, are computed first, and then ``rod_physics.py`` simulates them. If the float has not met the water ``HOLD``
+seconds after the end of the movement, the line is let out.
     outcome = FishingRod().execute(context, theta, rng)
 """
 
@@ -26,12 +26,12 @@ if TYPE_CHECKING:
 MODEL = Path(__file__).with_name("fishing_rod.xml")
 JOINTS = ("yaw", "shoulder", "elbow", "forearm_roll", "wrist_pitch", "wrist_yaw")
 JOINT_RANGES = Box(np.array([-1.6, 0.1, -1.2, -0.6, -0.4, -1.4]), np.array([1.6, 1.5, 0.8, 0.6, 1.4, 1.4]))  # rad
-DURATIONS = (0.8, 1.6)  # s, shortest and longest movement
-HOLD = 0.15  # time (s) from the last posture until the line is let out
-CORRELATION = 0.96  # correlation of the motor noise between two steps
-LONGEST = 60.0  # s, the longest recording that can be replayed
+DURATIONS = (0.8, 1.6)  # durations (s) of the shortest and of the longest movement
+HOLD = 0.15  # time (s) from the end of a movement until the line is let out
+CORRELATION = 0.96  # correlation of the motor noise at one step with that at the next step
+LONGEST = 60.0  # duration (s) of the longest recording that can be replayed
 
-_BLOCK = 32  # number of movements side by side; small blocks need little memory, and Ctrl-C works between blocks
+_BLOCK = 32  # number of movements simulated in parallel; small blocks need little memory, and Ctrl-C works between them
 
 
 class FishingRod:
@@ -49,8 +49,7 @@ class FishingRod:
         threads: number of threads of ``execute_many``; None for one per core.
 
     Raises:
-        ValueError: a negative or non-finite noise or wind, a line out of its range, no thread, or ``outcomes`` that
-            do not contain ``rest``.
+        ValueError: a number is out of its range, or ``outcomes`` does not contain ``rest``.
     """
 
     def __init__(
@@ -73,7 +72,7 @@ class FishingRod:
         self.primitive = GaussianPrimitive(JOINT_RANGES, DURATIONS, sharpness=6.0)
         self.policies = self.primitive.policies
         self.outcomes = Box.cube(-1.0, 1.0, 2, names=("x", "y"), unit="m") if outcomes is None else outcomes
-        self.outcome_noise = 1.15 * noise  # 1.15 m for each s of motor noise, see scripts/check_physics.py
+        self.outcome_noise = 1.15 * noise  # m; scripts/check_physics.py measures 1.15 m for each s of motor noise
         windy = max_wind > 0
         self.contexts = Box.cube(-max_wind, max_wind, int(windy), names=("wind (N)",) * windy)
         threads = None if threads is None else check_count("threads", threads, 1)
@@ -99,7 +98,7 @@ class FishingRod:
             ``(2,)`` m, landing point of the float.
 
         Raises:
-            ValueError: another shape, or a value that is not finite or outside its box.
+            ValueError: an argument has another shape, is not finite, or lies outside its box.
             TypeError: ``rng`` is not a Generator.
             SimulationError: the simulation diverged; the message names theta.
         """
@@ -107,14 +106,14 @@ class FishingRod:
         return self._execute(context[None], theta[None], [rng])[0]
 
     def execute_many(self, contexts: Array, thetas: Array, rngs: Sequence[np.random.Generator]) -> Array:
-        """``(n, 2)`` m, landing points of movements side by side; row i equals ``execute`` for row i bit for bit.
+        """``(n, 2)`` m, landing points; row i equals ``execute(contexts[i], thetas[i], rngs[i])`` bit for bit.
 
         The arguments are not checked; the function `execute_many` of ``protocol.py`` does that.
 
         Raises:
-            TypeError, SimulationError: as ``execute``.
+            TypeError, SimulationError: see ``execute``.
         """
-        # A block takes as many steps as its longest movement, so movements of about the same length run together.
+        # Each block has as many steps as its longest movement, so movements of similar duration share a block.
         order = thetas[:, -1].argsort(kind="stable")
         outcomes = np.empty((len(thetas), self.outcomes.dim))
         for start in range(0, len(order), _BLOCK):
@@ -123,7 +122,7 @@ class FishingRod:
         return outcomes
 
     def trace(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> RodTrace:
-        """Run one movement and keep every step, for films; this takes twice as long as ``execute``."""
+        """Run one movement and keep the state at every step, for films; this takes twice as long as ``execute``."""
         context, theta = check_movement(self, context, theta)
         commands, end = self._commands(theta, rng), self.primitive.duration(theta) + HOLD
         outcome = self._cast(context[None], theta[None], [commands], np.array([end]))[0]
@@ -140,8 +139,7 @@ class FishingRod:
             ``(2,)`` m, landing point of the float.
 
         Raises:
-            ValueError: shapes that do not fit, values that are not finite, or times that do not increase from 0 or
-                exceed 60 s.
+            ValueError: shapes do not fit, values are not finite, or times do not increase from 0 or exceed 60 s.
             SimulationError: the simulation diverged.
         """
         times, trajectory = check_recording(times, trajectory, len(JOINTS), longest=LONGEST)
@@ -169,7 +167,7 @@ class FishingRod:
         return landings
 
     def _times(self, end: float) -> Array:
-        """Times (s) of all commands up to ``end`` and one more, as sensors show the state *before* each step."""
+        """Times (s) of the commands up to ``end``, and of one more, as sensors show the state *before* each step."""
         step = self._caster.timestep
         return step * np.arange(math.ceil(end / step) + 1, dtype=np.float64)
 
@@ -180,9 +178,9 @@ class FishingRod:
         trajectory = self.primitive.at(theta, times)
         if not self.noise:
             return trajectory
-        from scipy.signal import lfilter  # its import takes longer than that of this whole library
+        from scipy.signal import lfilter  # only here, because this import takes longer than all imports of sgimd_torch
 
-        # Short and long movements draw equally often, so that the stream continues in the same way after both.
+        # All movements draw equally many numbers, so that later draws do not depend on their durations.
         draws = rng.standard_normal((self._draws, len(JOINTS)))[: len(times)]
         draws[1:] *= math.sqrt(1 - CORRELATION**2)
         noise = lfilter([1.0], [1.0, -CORRELATION], draws, axis=0)  # AR(1) of unit variance

@@ -1,4 +1,4 @@
-"""Gymnasium environments with continuous actions as environments of this library; a movement is an episode.
+"""Gymnasium environments with continuous actions as environments of this library; each episode is one movement.
 
 theta holds the parameters of a controller, which gives the actions; the outcome is a function of the observations.
     actions = Box(world.action_space.low, world.action_space.high)
@@ -28,21 +28,21 @@ except ImportError as error:
 class FromGymnasium:
     """An environment of this library that plays episodes of a gymnasium environment.
 
-    Each episode is reset with a seed drawn from ``rng``, so the randomness of the reset is the noise. Only one thread
-    at a time may use the environment. A warning of MuJoCo raises ``SimulationError``, as MuJoCo then resets its state.
+    Each episode is reset with a seed drawn from ``rng``, so the noise comes from the random reset. Only one thread at a
+    time may use the environment. After a warning MuJoCo resets its state, so a warning raises ``SimulationError``.
 
     Args:
         world: gymnasium environment with a Box of actions, with or without wrappers.
-        controller: controller that turns theta into actions; they are clipped to the action space.
+        controller: controller that turns theta into actions; the actions are clipped to the action space.
         outcomes: T.
         rest: ``(outcome_dim,)`` in T, the outcome of not moving.
-        outcome_noise: standard deviation of the outcomes of one movement, per dimension; see `measured_noise`.
-        steps: largest number of actions of an episode; the world may end it earlier.
-        outcome: (observations of an episode, the first included) -> ``(outcome_dim,)``.
-        dt: time between two actions (s); None for the ``dt`` of the world, if it has one, as in MuJoCo.
+        outcome_noise: standard deviation of each outcome dimension if a movement is repeated; see `measured_noise`.
+        steps: largest number of actions of an episode; the world may end an episode earlier.
+        outcome: function (list of all observations of an episode) -> outcome ``(outcome_dim,)``.
+        dt: time between two actions (s); None for the ``dt`` of the world, which MuJoCo's environments have.
 
     Raises:
-        ValueError: no Box of actions, no ``dt``, or ``rest`` outside T.
+        ValueError: the actions are no Box, there is no ``dt``, or ``rest`` lies outside T.
     """
 
     def __init__(
@@ -82,7 +82,7 @@ class FromGymnasium:
         """``(outcome_dim,)``, the outcome of one episode.
 
         Raises:
-            ValueError: ``theta`` is not one point of Pi, or the observations make no outcome.
+            ValueError: ``theta`` is not one point of Pi, or the function ``outcome`` returns no outcome.
             TypeError: ``rng`` is not a Generator.
             SimulationError: MuJoCo gave a warning, or the outcome is not finite.
         """
@@ -91,11 +91,11 @@ class FromGymnasium:
         return self._play(actions, rng, theta)
 
     def replay(self, actions: ArrayLike) -> Array:
-        """``(outcome_dim,)``, the outcome of recorded ``actions`` ``(n, action_dim)``, with the seed 0.
+        """``(outcome_dim,)``, the outcome of recorded ``actions`` ``(n, action_dim)``, always from the same start.
 
         Raises:
-            ValueError: actions of another shape, or more than the ``steps`` of a movement.
-            SimulationError: as ``execute``.
+            ValueError: ``actions`` has another shape, or more rows than the ``steps`` of a movement.
+            SimulationError: see ``execute``.
         """
         actions = check_vector("actions", actions, self._actions.shape[0])
         if actions.ndim != 2 or not 0 < len(actions) <= self.steps:
@@ -105,7 +105,7 @@ class FromGymnasium:
         return self._play(actions, stream(0, "replay"), actions[-1])
 
     def _play(self, actions: Array, rng: np.random.Generator, theta: Array) -> Array:
-        """The outcome of an episode of these ``actions``; an error names ``theta``."""
+        """The outcome of an episode of these ``actions``; a `SimulationError` names ``theta``."""
         check_rng(rng)
         observation, _ = self.world.reset(seed=int(rng.integers(2**31)))
         observations = [deepcopy(observation)]
@@ -124,7 +124,7 @@ class FromGymnasium:
 
 
 def measured_noise(environment: FromGymnasium, rng: np.random.Generator, *, movements: int = 20) -> float:
-    """The measured ``outcome_noise``: root mean square deviation over random movements, each executed three times."""
+    """Measured ``outcome_noise``: root mean square deviation over random movements, each executed three times."""
     variances = []
     for _ in range(movements):
         context, theta = environment.observe(rng), environment.policies.sample(rng)

@@ -1,8 +1,8 @@
 """Motor primitives and the correspondence problem: from theta to joint trajectories, and back.
 
-Section 4.1 of Nguyen & Oudeyer (2014). Each joint has four knots, its positions at 0, delta/3, 2 delta/3 and delta; the
-trajectory is a Gaussian distance weighting of the knots (eq. 5). A demonstrated trajectory is translated to the theta
-that reproduces it most closely (eq. 6).
+Section 4.1 of Nguyen & Oudeyer (2014). Each joint has four knots: its positions at 0, delta/3, 2 delta/3 and delta,
+where delta is the duration. The trajectory is a Gaussian distance weighting of the knots (eq. 5). A demonstrated
+trajectory is translated to the theta that reproduces it most closely (eq. 6).
     times, trajectory = primitive.trajectory(theta); theta_d = primitive.correspondence(times_d, trajectory_d)
 """
 
@@ -27,10 +27,11 @@ class GaussianPrimitive(Primitive):
     Args:
         joints: ``(n_joints,)`` box of joint ranges (rad).
         durations: shortest and longest duration delta (s), above 0.
-        sharpness: factor s in sigma = s / delta^2. Below 5 the fit is ill-conditioned, above 12 movements are jerky.
+        sharpness: factor s in sigma = s / delta^2. A factor below 5 makes the fit of eq. (6) ill-conditioned, a factor
+            above 12 makes movements jerky.
 
     Raises:
-        ValueError: durations that do not satisfy 0 < shortest < longest, or a sharpness that is not above 0.
+        ValueError: the durations do not satisfy 0 < shortest < longest, or the sharpness is not above 0.
     """
 
     def __init__(self, joints: Box, durations: tuple[float, float], *, sharpness: float = 9.0) -> None:
@@ -55,7 +56,7 @@ class GaussianPrimitive(Primitive):
         return self._weights(phases) @ self._knots(theta).T
 
     def trajectory(self, theta: ArrayLike, rate: float = 50.0) -> tuple[Array, Array]:
-        """A whole movement as a recording: times ``(n_times,)`` s from 0 to delta, angles ``(n_times, n_joints)`` rad.
+        """Times ``(n_times,)`` (s) from 0 to delta, and joint angles ``(n_times, n_joints)`` (rad) at these times.
 
         Args:
             theta: ``(theta_dim,)`` in [0, 1].
@@ -72,7 +73,7 @@ class GaussianPrimitive(Primitive):
     def fastest(self) -> tuple[Array, Array]:
         """``(n_joints,)`` rad/s and rad/s^2: the largest speeds and accelerations that any theta commands.
 
-        They occur at the shortest duration, if each knot lies at that end of its range which increases them.
+        They occur at the shortest duration, with each knot at the end of its range that increases them.
         """
         phases = np.linspace(0.0, 1.0, 1001)
         weights = self._weights(phases)
@@ -80,17 +81,17 @@ class GaussianPrimitive(Primitive):
         apart = slopes - (weights * slopes).sum(axis=1, keepdims=True)
         first = weights * apart
         second = weights * (apart**2 - (first * slopes).sum(axis=1, keepdims=True))
-        # The weights add up to 1, so increases and decreases balance: the positive part is half of all change.
+        # The weights sum to 1, so their derivatives sum to 0: the positive ones sum to half of all absolute values.
         speed, acceleration = (np.abs(each).sum(axis=1).max() / 2 for each in (first, second))
         return self.joints.sides * speed / self.durations[0], self.joints.sides * acceleration / self.durations[0] ** 2
 
     def correspondence(self, times: ArrayLike, trajectory: ArrayLike) -> Array:
         """theta_d, the policy that reproduces a demonstrated trajectory most closely, eq. (6).
 
-        delta is the demonstration's own duration. A demonstration shorter than ``durations`` allow is slowed down to
-        the shortest duration; a longer one is refused, as playing it faster would make it another movement. For a fixed
-        delta eq. (5) is linear in the knots, so each joint is one bounded linear least squares problem (trust-region
-        reflective, the paper's algorithm), exact up to the algorithm's tolerance.
+        delta is the duration of the demonstration. If this is below the shortest duration, the demonstration is slowed
+        down; if it is above the longest duration, the demonstration is refused, as a faster movement would be another
+        movement. For a fixed delta eq. (5) is linear in the knots, so each joint is one bounded linear least squares
+        problem, which is solved by the paper's algorithm (trust-region reflective).
 
         Args:
             times: ``(n_times,)`` s, increasing, at least 4 of them.
@@ -100,10 +101,10 @@ class GaussianPrimitive(Primitive):
             ``(theta_dim,)`` in [0, 1].
 
         Raises:
-            ValueError: shapes that do not fit, too few samples, values that are not finite, unsorted times, or a
-                recording longer than the longest movement.
+            ValueError: shapes do not fit, there are too few samples, values are not finite, times are not sorted, or
+                the recording lasts longer than the longest movement.
         """
-        from scipy.optimize import lsq_linear  # its import takes longer than that of this whole library
+        from scipy.optimize import lsq_linear  # only here, because this import takes longer than all of sgimd_torch
 
         times, trajectory = check_recording(
             times, trajectory, self.joints.dim, samples=KNOTS, longest=self.durations[1]
@@ -112,7 +113,7 @@ class GaussianPrimitive(Primitive):
         weights = self._weights((times - times[0]) / span)
         low, sides = self.joints.low, self.joints.sides
         scaled = (trajectory - low) / sides
-        # Where the knots stay inside, least squares without bounds is exact up to rounding; lsq_linear is not.
+        # If the knots of a joint lie in [0, 1], least squares without bounds is exact to rounding; lsq_linear is not.
         knots = np.linalg.lstsq(weights, scaled, rcond=None)[0]
         for joint in np.flatnonzero((np.abs(knots - 0.5) > 0.5 + 1e-9).any(axis=0)):
             knots[:, joint] = lsq_linear(weights, scaled[:, joint], bounds=(0.0, 1.0), method="trf", tol=1e-12).x

@@ -1,7 +1,7 @@
 """Toy robots that act on an object: most movements do not touch it and have no effect.
 
-The outcome is the final place of the object, not that of the hand. So a movement that misses the object does
-not tell by how much it missed, and babbling learns from few of its movements.
+The outcome is the final place of the object, not of the hand. If a movement misses the object, the outcome does
+not show how far the hand was from the object. So goal babbling learns nothing from most movements.
     puck: a puck to hit; its place is the context        fetch: a ball to grasp and carry
     robot = puck(); outcome = robot.execute(robot.observe(rng), theta, rng)
 """
@@ -16,25 +16,25 @@ from numpy.typing import NDArray
 from sgimd_torch.environments.toys import GRAVITY, Toy
 from sgimd_torch.spaces import Array, Box
 
-_STEPS: Final = 50  # number of steps of a swing; the hand moves straight within a step
+_STEPS: Final = 50  # number of steps of a swing; within a step the hand moves in a straight line
 _FRICTION: Final = 0.3  # coefficient of friction of the puck on the table
 _BOUNCE: Final = 0.5  # coefficient of restitution of hand and puck
 
 
 def puck(*, noise: float = 0.005) -> Toy:
-    """An arm hits a puck, which slides until friction stops it; walls reflect it. Context: the puck's place (m).
+    """An arm hits a puck, which slides until friction stops it; walls reflect the puck. Context: the puck's place (m).
 
-    theta: turn and reach of the arm at the start of its swing on the table, turn and reach at the end, and the speed.
-    When the hand touches the puck, the puck leaves along the line from the hand, and the arm stops. A hand that is
-    lowered onto the puck holds it still. Outcome: the place where the puck comes to rest (m).
+    theta: turn and reach of the arm at the start of its swing, turn and reach at the end, and speed of the swing. When
+    the hand touches the puck, the arm stops and the puck slides away from the hand. If the hand already touches the
+    puck at the start of the swing, the puck does not move. Outcome: the final place of the puck (m).
     """
     ranges = Box(np.array([-np.pi * 5 / 12, 0.3]), np.array([np.pi * 5 / 12, 0.9]))  # rad and m
-    apart = 0.1  # m between the middles of hand and puck when they touch
-    shortest, longest = 0.5, 1.5  # s, durations of a swing
+    apart = 0.1  # distance (m) between the middles of hand and puck when they touch
+    shortest, longest = 0.5, 1.5  # shortest and longest duration of a swing (s)
     table = Box(np.array([0.0, -0.8]), np.array([1.2, 0.8]), ("x", "y"), "m")
     places = Box(np.array([0.35, 0.2]), np.array([0.65, 0.5]), ("puck x", "puck y"), "m")
     times = np.linspace(0, 1, _STEPS + 1)
-    course = (3 * times**2 - 2 * times**3)[:, None]  # the course begins and ends at rest
+    course = (3 * times**2 - 2 * times**3)[:, None]  # share of the swing done; the speed at both ends is 0
 
     def rest(context: Array, theta: Array) -> Array:
         start, end = (ranges.low + theta[..., None, k : k + 2] * ranges.sides for k in (0, 2))
@@ -56,7 +56,7 @@ def puck(*, noise: float = 0.005) -> Toy:
 
 
 def fetch(*, noise: float = 0.005) -> Toy:
-    """An arm closes its hand in one posture and opens it in another; it carries a ball within .15 m of the closed hand.
+    """An arm closes its hand in one posture, opens it in another, and carries a ball within .15 m of the closing hand.
 
     theta: angles of the four joints where the hand closes, then where it opens. Outcome: final place of the ball (m).
     """
@@ -82,13 +82,13 @@ def _at(path: Array, index: NDArray[np.intp]) -> Array:
 
 
 def _until(distance: float, before: Array, step: Array) -> Array:
-    """``(..., 1)``, the share of ``step`` after which a point that starts at ``before`` is within ``distance`` of 0."""
+    """``(..., 1)``, share of ``step`` after which a point that begins at ``before`` is ``distance`` from the origin."""
     a, b = ((each * step).sum(axis=-1, keepdims=True) for each in (step, before))
     c = (before * before).sum(axis=-1, keepdims=True) - distance**2
     return np.clip((-b - np.sqrt(np.maximum(b * b - a * c, 0))) / np.maximum(a, 1e-300), 0, 1)
 
 
 def _reflected(places: Array, box: Box) -> Array:
-    """``places`` folded into ``box``: the places where an object comes to rest if walls reflect it without loss."""
+    """``places`` folded into ``box``: the final places of an object that the walls reflect without loss."""
     laps = (places - box.low) / box.sides % 2
     return box.low + box.sides * (1 - np.abs(1 - laps))

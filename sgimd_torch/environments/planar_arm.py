@@ -12,23 +12,24 @@ from sgimd_torch.environments.protocol import Sketch, check_movement, check_reco
 from sgimd_torch.spaces import Array, Box, check_count, check_rng, check_vector, first_entry
 
 _STEP = 0.04  # time (s) between two drawings of a movement
-_STEPS = 26  # number of drawings, from rest to the last posture
+_STEPS = 26  # number of drawings of a movement
 
 
 class PlanarArm:
     """An arm of equal links in the plane, 1 m long; the outcome is the position of its end.
 
-    ``theta`` in [0, 1]^n_joints is scaled to joint angles; .5 gives the angle 0. The first joint turns in [-pi, pi],
-    each other joint bends by 2 pi / n_joints at most. So the arm reaches exactly the disc of radius 1 m.
+    ``theta`` in [0, 1]^n_joints is scaled to joint angles; .5 gives the angle 0. The first joint turns by pi rad at
+    most, each other joint by 2 pi / n_joints rad. So the reachable set is exactly the disc of radius 1 m.
 
     Args:
         n_joints: number of joints, at least 2.
         noise: standard deviation of the noise on every joint angle (rad).
-        context: whether a context turns the whole arm, by an angle in [-pi/4, pi/4]; ``rest`` has the context 0.
+        context: true: the context is an angle (rad) in [-pi/4, pi/4], by which the whole arm is turned; false: the
+            context is empty.
         outcomes: T; None for the square around the disc.
 
     Raises:
-        ValueError: a number out of its range, or ``outcomes`` that do not contain ``rest``.
+        ValueError: a number is out of its range, or ``outcomes`` does not contain ``rest``.
     """
 
     def __init__(
@@ -48,7 +49,7 @@ class PlanarArm:
         self.rest = self.outcomes.check("rest, where the straight arm ends,", [1.0, 0.0], "T has 2 dimensions")
         self.rest.flags.writeable = False
         self.noise = noise
-        self._limits = np.array([np.pi] + [2 * np.pi / n_joints] * (n_joints - 1))  # least bends that close a circle
+        self._limits = np.array([np.pi] + [2 * np.pi / n_joints] * (n_joints - 1))  # rad; just enough to form a circle
         self.outcome_noise = self._mean_outcome_noise()
 
     def observe(self, rng: np.random.Generator) -> Array:
@@ -66,7 +67,7 @@ class PlanarArm:
         return self._end(context, self._moved(theta, rng))
 
     def trace(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Sketch:
-        """A movement as a drawing: in 1 s all joints turn smoothly from the straight arm to their angles."""
+        """Drawings of a movement: in 1 s all joints turn smoothly from the straight arm to their angles."""
         context, theta = check_movement(self, context, theta)
         angles, times = self._moved(theta, rng), np.linspace(0, 1, _STEPS)[:, None]
         directions = np.cumsum(times**2 * (3 - 2 * times) * angles, axis=1) + context.sum()
@@ -85,7 +86,7 @@ class PlanarArm:
     def correspondence(self, times: ArrayLike, trajectory: ArrayLike) -> Array:
         """theta_d, the policy that ends in the last posture of a demonstrated trajectory: the inverse of ``angles``.
 
-        The outcome depends only on the last posture, which theta_d meets exactly; so theta_d solves eq. (6).
+        The outcome depends only on the last posture, and theta_d reproduces this posture; so theta_d solves eq. (6).
 
         Args:
             times: ``(n_times,)`` s, increasing.
@@ -95,8 +96,8 @@ class PlanarArm:
             ``(n_joints,)`` in [0, 1].
 
         Raises:
-            ValueError: shapes that do not fit, values that are not finite, unsorted times, or a last posture that the
-                joints cannot take.
+            ValueError: shapes do not fit, values are not finite, times are not sorted, or the joints cannot take the
+                last posture.
         """
         _, trajectory = check_recording(times, trajectory, self.policies.dim, samples=1)
         turned = trajectory[-1] / self._limits
@@ -108,17 +109,17 @@ class PlanarArm:
         return self.policies.clip((turned + 1) / 2)
 
     def reachable(self, points: ArrayLike) -> NDArray[np.bool_]:
-        """``(...)``, whether some theta without noise reaches each of ``points`` ``(..., 2)``, up to rounding."""
+        """``(...)``, whether each of ``points`` ``(..., 2)`` is the outcome of some theta without noise."""
         is_reachable: NDArray[np.bool_] = np.linalg.norm(check_vector("points", points, 2), axis=-1) <= 1 + 1e-12
         return is_reachable
 
     def solve(self, context: ArrayLike, goal: ArrayLike) -> Array:
-        """``(n_joints,)``, a theta that reaches ``goal`` without noise: the first joint turns, all others bend equally.
+        """``(n_joints,)``, the theta that reaches ``goal`` without noise and bends all joints but the first equally.
 
         Raises:
             ValueError: ``goal`` is not one reachable point ``(2,)``, or ``context`` is not one point of C.
         """
-        from scipy.optimize import root_scalar  # its import takes longer than that of this whole library
+        from scipy.optimize import root_scalar  # only here, because this import takes longer than all of sgimd_torch
 
         context, _ = check_movement(self, context, np.full(self.policies.dim, 0.5))
         goal = check_vector("goal", goal, 2, "was theta passed instead?")
@@ -127,14 +128,15 @@ class PlanarArm:
         n, circle = self.policies.dim, self._limits[1]
         radius = np.clip(np.linalg.norm(goal), self._radius(circle), self._radius(0.0))
         bend = root_scalar(lambda bend: self._radius(bend) - radius, bracket=(0.0, circle), xtol=1e-15).root
-        first = np.arctan2(goal[1], goal[0]) - context.sum() - (n - 1) / 2 * bend  # the chord halves the total turn
+        # The end lies in the mean direction of the links.
+        first = np.arctan2(goal[1], goal[0]) - context.sum() - (n - 1) / 2 * bend
         angles = np.array([np.angle(np.exp(1j * first))] + [bend] * (n - 1))
         return self.policies.clip((angles / self._limits + 1) / 2)
 
     def _moved(self, theta: Array, rng: np.random.Generator) -> Array:
         """``(n_joints,)`` rad, the angles with noise."""
         check_rng(rng)
-        # Noise is drawn even if its size is 0, so that the stream continues in the same way.
+        # Noise is drawn even if ``noise`` is 0, so that later draws do not depend on ``noise``.
         return self.angles(theta) + self.noise * rng.standard_normal(len(theta))
 
     def _end(self, context: Array, angles: Array) -> Array:
@@ -142,7 +144,7 @@ class PlanarArm:
         return 1 / len(angles) * np.array([np.cos(directions).sum(), np.sin(directions).sum()])
 
     def _radius(self, bend: float) -> float:
-        """Distance of the end if all joints but the first have this bend: 1 m without a bend, 0 at a full turn."""
+        """Distance (m) of the end from the base if all joints but the first are at ``bend`` (rad)."""
         n = self.policies.dim
         return float(1 / n * np.cos((np.arange(n) - (n - 1) / 2) * bend).sum())
 
@@ -151,6 +153,6 @@ class PlanarArm:
         n, straightness = self.policies.dim, np.sinc(self._limits[1] / np.pi)  # the mean cosine of a bend
         apart = np.abs(np.subtract.outer(np.arange(n), np.arange(n)))
         alignment = straightness**apart  # (n, n) the mean cosine between two links
-        # A joint moves the end by its angle times its lever, the distance from the joint to the end.
+        # A small turn of a joint moves the end by the angle times the lever, the distance from the joint to the end.
         levers = [alignment[joint:, joint:].sum() for joint in range(n)]
         return float(self.noise / n * np.sqrt(np.sum(levers) / 2))

@@ -34,7 +34,7 @@ class Environment(Protocol):
 
     @property
     def outcomes(self) -> Box:
-        """T, the space of goals. Outcomes may lie outside it."""
+        """T, the space of goals. Outcomes may lie outside T."""
         ...
 
     @property
@@ -44,7 +44,7 @@ class Environment(Protocol):
 
     @property
     def outcome_noise(self) -> float:
-        """Typical standard deviation (m), per dimension, of the outcomes of one movement; 0 if it has no noise."""
+        """Standard deviation of each outcome dimension (in the unit of T) if a typical movement is repeated, or 0."""
         ...
 
     def observe(self, rng: np.random.Generator) -> Array:
@@ -71,14 +71,14 @@ class BatchEnvironment(Environment, Protocol):
 
 
 class Primitive:
-    """How theta becomes joint angles (rad) or commands over time.
+    """Translation of theta to joint angles (rad) or commands over time.
 
-    A robot whose primitive is known has it as attribute ``primitive``, so that recordings can be compared with what the
-    robot plays. The defaults mean that a value is unknown.
+    The attribute ``primitive`` of an environment holds its primitive, so that recordings can be compared with the
+    movements of the robot. A default value means that the value is unknown.
 
     Attributes:
         ranges: ``(n_joints,)`` box of the angles or commands.
-        durations: shortest and longest movement (s).
+        durations: durations (s) of the shortest and of the longest movement.
     """
 
     ranges: Box | None = None
@@ -91,11 +91,11 @@ class Primitive:
 
 @runtime_checkable
 class HasPrimitive(Protocol):
-    """A robot that says how it plays a theta."""
+    """An environment with a known primitive."""
 
     @property
     def primitive(self) -> Primitive:
-        """The primitive that plays the movements of this robot."""
+        """Primitive of this robot."""
         ...
 
 
@@ -110,29 +110,30 @@ class Trace(Protocol):
 
     @property
     def outcome(self) -> Array:
-        """``(outcome_dim,)``, equal to that of ``execute`` with an equal stream."""
+        """``(outcome_dim,)``, equal to the outcome of ``execute`` with an equal random stream."""
         ...
 
     @property
     def landed(self) -> float:
-        """Time (s) when the outcome is reached."""
+        """Time (s) from the start of the movement until its outcome is reached."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class Sketch:
-    """A movement as a drawing for `sgimd film`: the result of ``trace(context, theta, rng)``, an optional method of an
-    environment.
+    """Drawings of a movement for `sgimd film`.
+
+    An environment may have a method ``trace(context, theta, rng)`` that returns a Sketch.
 
     Args:
-        outcome: ``(outcome_dim,)``, equal to that of ``execute`` with an equal stream. The first two dimensions are
-            places in the drawing; if T has only one, y is 0.
+        outcome: ``(outcome_dim,)``, equal to the outcome of ``execute`` with an equal random stream. Its first two
+            dimensions are x and y in the drawing; if it has one dimension, y is 0.
         step: time between two drawings (s).
-        chains: ``(n_steps, n_points, 2)``, the robot as points joined by lines; a single point is a ball. The last
-            point leaves a path.
+        chains: ``(n_steps, n_points, 2)``, points of the robot, which the film joins by lines; a single point is drawn
+            as a ball. The film also shows the path of the last point.
 
     Raises:
-        ValueError: other shapes, numbers that are not finite, or a step that is not above 0.
+        ValueError: an array has another shape or is not finite, or the step is not above 0.
     """
 
     outcome: Array
@@ -156,17 +157,17 @@ class Sketch:
 
 
 Tracer = Callable[[Array, Array, np.random.Generator], Trace]
-"""(context, theta, rng) -> the movement, to be filmed."""
+"""Function (context, theta, rng) -> movement that can be filmed."""
 
 FAILURES: Final = 10
-"""Number of failed movements in a row that end a run."""
+"""Number of successive failed movements after which a run ends."""
 
 
 class SimulationError(RuntimeError):
-    """A movement without usable outcome: ``SimulationError("diverged")``, or with its ``theta`` ``(theta_dim,)``."""
+    """A movement failed and has no usable outcome; if ``theta`` ``(theta_dim,)`` is given, the message names it."""
 
     def __init__(self, reason: str, theta: Array | None = None) -> None:
-        super().__init__(reason, theta)  # args rebuild the error in another process
+        super().__init__(reason, theta)  # pickle needs both arguments to send the exception to another process
         self.reason, self.theta = reason, theta
 
     def __str__(self) -> str:
@@ -176,10 +177,10 @@ class SimulationError(RuntimeError):
 def execute_many(
     environment: Environment, contexts: ArrayLike, thetas: ArrayLike, rngs: Sequence[np.random.Generator]
 ) -> Array:
-    """Execute many movements: together if the environment can, else one by one, with equal outcomes.
+    """Execute many movements, together if the environment is a `BatchEnvironment`, else one by one.
 
     Args:
-        environment: environment of the movements; a `BatchEnvironment` is called once for all movements.
+        environment: environment of the movements.
         contexts: ``(n, context_dim)`` in C.
         thetas: ``(n, theta_dim)`` in Pi.
         rngs: n streams, one for each movement, so that no outcome depends on other movements of the batch.
@@ -188,11 +189,11 @@ def execute_many(
         ``(n, outcome_dim)``, row i equal to ``environment.execute(contexts[i], thetas[i], rngs[i])`` bit for bit.
 
     Raises:
-        ValueError: the numbers of rows differ, a row lies outside C or Pi, or the environment does not return numbers
-            of this shape.
+        ValueError: the numbers of rows differ, a row lies outside C or Pi, or the environment returns anything but
+            outcomes.
         SimulationError: a movement has no finite outcome.
     """
-    # Copies, so that an environment may write into them.
+    # Copies, because an environment may change its arguments.
     contexts = environment.contexts.check("contexts", contexts).copy()
     thetas = environment.policies.check("thetas", thetas, "were goals passed instead?").copy()
     if not contexts.ndim == thetas.ndim == 2 or not len(contexts) == len(thetas) == len(rngs):
@@ -220,7 +221,7 @@ def _numbers(what: str, value: Any, *shape: int) -> Array:
 
 
 def traced(environment: Environment, trace: Tracer, context: Array, theta: Array, rng: np.random.Generator) -> Trace:
-    """The result of ``trace``, the optional method of ``environment``, checked.
+    """Call ``trace``, the optional method of ``environment``, and check the result.
 
     Raises:
         ValueError: ``trace`` fails, or its result cannot be drawn.
@@ -240,10 +241,10 @@ def traced(environment: Environment, trace: Tracer, context: Array, theta: Array
 
 
 def check_movement(environment: Environment, context: ArrayLike, theta: ArrayLike) -> tuple[Array, Array]:
-    """One point of C and one point of Pi, as float64; ``execute`` of an environment calls this function first.
+    """Check a movement at the start of ``execute``; the result is ``context`` and ``theta`` as float64.
 
     Raises:
-        ValueError: another shape, NaN or infinity, or a point outside its box.
+        ValueError: a point has another shape, is not finite, or lies outside its box.
     """
     context = environment.contexts.check("context", context, "was theta passed first?")
     theta = environment.policies.check("theta", theta, "was a goal passed instead?")
@@ -255,11 +256,11 @@ def check_movement(environment: Environment, context: ArrayLike, theta: ArrayLik
 def check_recording(
     times: ArrayLike, trajectory: ArrayLike, columns: int, *, samples: int = 2, longest: float = np.inf
 ) -> tuple[Array, Array]:
-    """A recording as float64: ``(n_times,)`` s, and ``(n_times, columns)`` angles or commands.
+    """Check a recording; the result is ``times`` ``(n_times,)`` and ``trajectory`` ``(n_times, columns)`` as float64.
 
     Raises:
-        ValueError: shapes that do not fit, fewer than ``samples`` rows, values that are not finite, times that do not
-            increase, or a recording that lasts longer than ``longest`` s.
+        ValueError: shapes do not fit, there are fewer than ``samples`` rows, values are not finite, times do not
+            increase, or the recording lasts longer than ``longest`` s.
     """
     trajectory = check_vector("trajectory", trajectory, columns, "one column for each joint or command")
     if trajectory.ndim != 2 or len(trajectory) < samples:
@@ -282,7 +283,7 @@ def check_recording(
 
 
 def check_instance(environment: object) -> None:
-    """Refuse a class, or another object, in place of an environment.
+    """Refuse an object that is no environment, for example a class instead of an instance.
 
     Raises:
         ValueError: ``environment`` is a class, or lacks a member.
@@ -298,11 +299,11 @@ def check_instance(environment: object) -> None:
 
 
 def check_robot(environment: Environment) -> None:
-    """Refuse an environment that lacks a member or whose rest or noise makes no sense, before a learner is built.
+    """Refuse an environment with a missing member, an invalid ``rest`` or an invalid ``outcome_noise``.
 
     Raises:
-        ValueError: a class, a missing member, a rest that is not one point of T, or a noise that is negative or not
-            finite.
+        ValueError: ``environment`` is a class or lacks a member, ``rest`` is not one point of T, or ``outcome_noise``
+            is negative or not finite.
     """
     check_instance(environment)
     if environment.outcomes.check("rest of the environment", environment.rest, "is it a theta?").ndim != 1:

@@ -1,12 +1,12 @@
 """Physics of the fishing rod: the arm follows commands in MuJoCo, the line swings, and the float lands on the water.
 
 Section 4 of Nguyen & Oudeyer (2014); ``fishing_rod.py`` computes the commands. All commands are known before a movement
-begins, so MuJoCo runs many movements side by side, outside Python.
+begins, so MuJoCo simulates many movements in parallel, outside Python.
     landings, diverged = Caster(path, posture).cast([commands], ends)
 
-The float lands at the first point where it meets the water (z = 0), interpolated between two steps. If it has not met
-the water when the commands end, the line is let out: the float then flies freely, pushed by the wind, and lands where
-its parabola meets the water. So every movement has exactly one landing point.
+The landing point is where the float first meets the water (z = 0), interpolated between two steps. If the float has not
+met the water when the commands end, the line is let out: the float then flies freely, pushed by the wind, and lands
+where its parabola meets the water. So every movement has exactly one landing point.
 """
 
 from __future__ import annotations
@@ -22,24 +22,24 @@ from mujoco import rollout
 
 from sgimd_torch.spaces import Array
 
-TOP_SPEED = 500.0  # rad/s; a diverging simulation exceeds this speed, 100,000 random movements stay far below it
+TOP_SPEED = 500.0  # rad/s; a diverging simulation exceeds it, and 100,000 random movements stayed far below
 
 _STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 
 
 @dataclass(frozen=True, eq=False)
 class RodTrace:
-    """A movement of the rod step by step.
+    """States of the rod at each step of a movement.
 
-    After the line is let out, arm and rod hold their last posture, and ``states`` no longer tell where the float is.
+    After the line is let out, arm and rod hold their last posture, and only ``float_at`` gives the float's position.
 
     Args:
         outcome: ``(2,)`` m, landing point of the float.
-        landed: time of landing (s).
-        let_out: time when the line was let out (s); None if the float met the water before.
+        landed: time (s) when the float landed.
+        let_out: time (s) when the line was let out; None if the float met the water before.
         step: time between two states (s).
-        states: ``(n_steps, n_state)``, MuJoCo's full physics states from the time 0 to ``landed`` or just beyond.
-        floats: ``(n_steps, 6)``, position (m) and velocity (m/s) of the float on its line in those states.
+        states: ``(n_steps, n_state)``, MuJoCo's full physics states, up to the first one at or after ``landed``.
+        floats: ``(n_steps, 6)``, position (m) and velocity (m/s) of the float in ``states``, always on its line.
         push: acceleration (m/s^2) along x that the wind gives to a freely flying float.
         gravity: downward acceleration (m/s^2) of a freely flying float.
     """
@@ -74,8 +74,8 @@ class Caster:
     Args:
         path: file of the MuJoCo model, ``fishing_rod.xml``.
         posture: ``(6,)`` rad, start posture of the arm.
-        threads: number of threads for several movements at once; None for one per core.
-        line: factor on length and mass of the line in ``path``.
+        threads: number of threads that simulate several movements; None for one per core.
+        line: length and mass of the line, relative to the model in ``path``.
     """
 
     def __init__(self, path: Path, posture: Array, threads: int | None = None, *, line: float = 1.0) -> None:
@@ -87,14 +87,14 @@ class Caster:
         self._pools: dict[int, tuple[rollout.Rollout, list[mujoco.MjData]]] = {}
         self._rooms: dict[str, Array] = {}
         self.home, self.hanging = self._settle(posture)
-        """The start configuration, a full physics state; and ``(6,)``, position (m) and velocity (m/s) of its float."""
+        """Start configuration (a full physics state), and position (m) and velocity (m/s) ``(6,)`` of its float."""
 
     def cast(self, commands: list[Array], ends: Array, winds: Array) -> tuple[Array, np.ndarray]:
-        """Run movements side by side; each outcome equals, bit for bit, the outcome of the movement alone.
+        """Simulate movements in parallel; the outcome of each is the same, bit for bit, as if simulated alone.
 
         Args:
             commands: n arrays ``(n_steps, 6)`` rad, a row for each time step.
-            ends: ``(n,)`` s, times when the line is let out, within the last step.
+            ends: ``(n,)`` s, times when the line is let out, each within the last step of its movement.
             winds: ``(n,)`` N, forces of the wind on the float along x.
 
         Returns:
@@ -107,8 +107,8 @@ class Caster:
         for row, end in enumerate(ends):
             n_steps = len(commands[row])
             speed, track = run[row, :n_steps, speeds], seen[row, :n_steps]
-            wet = int((track[:, 2] <= 0).argmax())  # 0 if no step is wet, as the float begins above the water
-            if not (speed.max() < TOP_SPEED and speed.min() > -TOP_SPEED):  # NaN, too, is refused
+            wet = int((track[:, 2] <= 0).argmax())  # first step with the float in the water; 0 if there is none
+            if not (speed.max() < TOP_SPEED and speed.min() > -TOP_SPEED):  # also true for NaN
                 diverged[row] = True
             elif wet:
                 landings[row] = _crossing(track[wet - 1], track[wet])
@@ -118,7 +118,7 @@ class Caster:
         return landings, diverged
 
     def trace(self, outcome: Array, commands: Array, end: float, wind: float) -> RodTrace:
-        """One movement, step by step; its float lands at ``outcome``, as ``cast`` found."""
+        """Trace of one movement, whose landing point ``outcome`` was computed by ``cast``."""
         states, controls = self._begin([commands], np.array([wind]))
         run, seen = self._rollout(states, controls)
         states, floats, push = np.concatenate([states, run[0]]), seen[0].copy(), wind / self._float_mass
@@ -140,7 +140,7 @@ class Caster:
         return RodTrace(outcome, landed, let_out, self.timestep, *kept, push, self._gravity)
 
     def _settle(self, posture: Array) -> tuple[Array, Array]:
-        """c_org, the start configuration, with the arm in its posture and the line hanging still; and its float."""
+        """Start configuration c_org, with the arm in ``posture`` and the line hanging still, and state of its float."""
         data = mujoco.MjData(self.model)
         data.qpos[:6] = posture
         data.qpos[6] = -(posture[1] + posture[2] + posture[4])  # opposite to the rod's pitch, so the line hangs plumb
@@ -154,7 +154,7 @@ class Caster:
         return home, data.sensordata.copy()
 
     def _begin(self, commands: list[Array], winds: Array) -> tuple[Array, Array]:
-        """Start states ``(n, n_state)`` and controls ``(n, n_steps, 7)``; short movements hold their last commands."""
+        """Start states ``(n, n_state)`` and controls ``(n, n_steps, 7)``; short movements repeat their last command."""
         n = len(commands)
         controls = np.zeros((n, max(map(len, commands)), self.model.nu))
         for k, sequence in enumerate(commands):
@@ -164,20 +164,20 @@ class Caster:
         return np.repeat(self.home[None], n, axis=0), controls
 
     def _let_out(self, seen: Array, wind: float) -> tuple[float, float]:
-        """The landing point after a free flight from this position and velocity ``(6,)``."""
+        """Landing point (m) after a free flight that begins at the position and velocity ``seen`` ``(6,)``."""
         x, y, _, dx, dy, _ = seen.tolist()
         flight = self._flight(seen)
         return x + (dx + wind / self._float_mass * flight / 2) * flight, y + dy * flight
 
     def _flight(self, seen: Array) -> float:
-        """The duration (s) of a free flight from this position and velocity ``(6,)``."""
+        """Duration (s) of a free flight that begins at the position and velocity ``seen`` ``(6,)``."""
         z, dz = float(seen[2]), float(seen[5])
         return (dz + math.sqrt(dz * dz + 2 * self._gravity * max(z, 0.0))) / self._gravity
 
     def _rollout(self, states: Array, controls: Array) -> tuple[Array, Array]:
-        """States after each step, and position and velocity of the float *before* each step, as sensors show them.
+        """States after each step; position and velocity of the float *before* each step, when MuJoCo reads its sensors.
 
-        The next call overwrites both arrays: allocating new memory would take longer than the rest of this class.
+        The next call overwrites both arrays: allocating new arrays would take longer than all else in this class.
         """
         threads = self._threads if len(states) > 1 else 1
         if threads not in self._pools:
@@ -187,7 +187,7 @@ class Caster:
         n, n_steps = controls.shape[:2]
         run = self._room("run", n, n_steps, states.shape[1])
         seen = self._room("seen", n, n_steps, self.model.nsensordata)
-        # MuJoCo's own checks and copies would take as long as four steps; the shapes are right by construction.
+        # MuJoCo's own checks and copies would take as long as four time steps; the shapes are right by construction.
         pool.rollout(
             [self.model] * n, data, states, controls, state=run, sensordata=seen, nstep=n_steps, skip_checks=True
         )
@@ -206,7 +206,7 @@ def _crossing(above: Array, below: Array) -> Array:
 
 
 def _model(path: Path, line: float) -> mujoco.MjModel:
-    """The model in ``path``, each segment of its line ``line`` times as long and as heavy."""
+    """The model in ``path``, with length and mass of each segment of the line multiplied by ``line``."""
     if line == 1:
         return mujoco.MjModel.from_xml_path(str(path))
     spec = mujoco.MjSpec.from_file(str(path))

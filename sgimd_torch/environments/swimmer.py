@@ -1,7 +1,7 @@
 """Gymnasium's Swimmer-v5: a swimmer of three links travels for 6 seconds.
 
-theta: amplitude, phase and offset of a sinusoid for each of the two joints, and a frequency. The outcome is the
-distance travelled (m), along x and y. The noise is a small random change of the start posture and speeds.
+theta: amplitude, phase and offset of a sinusoid for each of the two joints, and their frequency. The outcome is the
+distance travelled (m), along x and y. The noise is a small random change of posture and speeds at the start.
     swimmer = Swimmer(); outcome = swimmer.execute(np.zeros(0), theta, rng)
 """
 
@@ -17,16 +17,16 @@ from sgimd_torch.environments.from_gymnasium import FromGymnasium, gymnasium
 from sgimd_torch.spaces import Array, Box
 
 STEPS: Final = 150  # number of actions of a movement, .04 s each
-FREQUENCIES: Final = (0.2, 2.0)  # Hz
-START: Final = 0.02  # half range of positions (m, rad) and speeds at the start
-NOISE: Final = 0.015  # m, the result of measured_noise
+FREQUENCIES: Final = (0.2, 2.0)  # lowest and highest (Hz)
+START: Final = 0.02  # largest random change of positions (m, rad) and speeds (m/s, rad/s) at the start
+NOISE: Final = 0.015  # m, measured by `measured_noise`
 
 
 class Swimmer(FromGymnasium):
     """theta in [0, 1]^7 -> distance travelled (m), along x and y.
 
     Args:
-        start: half range of the random positions (m, rad) and speeds at the start; 0 for no noise.
+        start: largest random change of positions (m, rad) and speeds (m/s, rad/s) at the start; 0 for no noise.
     """
 
     def __init__(self, *, start: float = START) -> None:
@@ -47,5 +47,5 @@ class Swimmer(FromGymnasium):
 
 
 def travelled(observations: Sequence[Any]) -> Array:
-    """``(2,)`` m, the way from the first observation to the last; an observation begins with x and y."""
+    """``(2,)`` m, distance along x and y from the first observation to the last; an observation begins with x and y."""
     return np.asarray(observations[-1][:2] - observations[0][:2], dtype=np.float64)

@@ -26,7 +26,8 @@ class ToGymnasium(gymnasium.Env[Any, Any]):
 
     ``observation`` is the context, ``achieved_goal`` the outcome (``rest`` before the movement), ``desired_goal`` the
     goal. Goal and context are drawn, or given as ``reset(options={"goal": ..., "context": ...})``. The reward is minus
-    the distance between goal and outcome; ``is_success`` in ``info`` means at most .02, or the outcome noise if larger.
+    the distance of the outcome from the goal. ``info["is_success"]`` is true if this distance is at most .02, or at
+    most the outcome noise.
     """
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - as gymnasium declares it
@@ -79,7 +80,7 @@ class ToGymnasium(gymnasium.Env[Any, Any]):
         return observation, -distance, True, False, info
 
     def compute_reward(self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: Any = None) -> Array:
-        """Minus the distance, ``(...)`` for goals ``(..., outcome_dim)``; hindsight relabelling calls it."""
+        """Minus the distances ``(...)`` between the two goals ``(..., outcome_dim)``, for hindsight relabelling."""
         return -np.linalg.norm(np.subtract(achieved_goal, desired_goal), axis=-1)
 
     def _observation(self, outcome: Array) -> Observation:

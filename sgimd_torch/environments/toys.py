@@ -1,7 +1,7 @@
 """Toy robots, each of which is hard to learn for a different reason; a movement takes microseconds.
 
-Each is a ``Toy``: boxes, and a function from a movement to its outcome, to which Gaussian noise is added.
-    toss: the wind is the context                    crawler: parameters are phases, 0 equals 1
+Each is a ``Toy``: boxes, and a function from context and theta to the outcome, to which Gaussian noise is added.
+    toss: the wind is the context                    crawler: most parameters are phases, for which 0 equals 1
     two_elbows: two families of postures             spatial_arm: three outcome dimensions, in cm
     robot = toss(); outcome = robot.execute(robot.observe(rng), theta, rng)
 """
@@ -29,8 +29,8 @@ class Toy:
 
     Args:
         contexts, policies, outcomes: C, Pi and T.
-        effect: (contexts ``(..., context_dim)``, thetas ``(..., theta_dim)``) -> outcomes without noise.
-        still: ``(theta_dim,)``, the movement whose outcome in the middle of C is ``rest``.
+        effect: function (contexts ``(..., context_dim)``, thetas ``(..., theta_dim)``) -> outcomes without noise.
+        still: ``(theta_dim,)``, movement whose outcome in the middle of C is ``rest``.
         outcome_noise: standard deviation of the noise on each dimension of the outcome, in the unit of T.
     """
 
@@ -65,8 +65,8 @@ class Toy:
 def toss(*, noise: float = 0.03) -> Toy:
     """An arm throws a ball on a floor; the context is the wind (m/s^2) from the left.
 
-    theta: direction, elevation, speed, height of release. A high and a flat throw can land in the same place; the wind
-    blows a high throw farther. Outcome: landing place, sideways and forwards (m).
+    theta: direction, elevation, speed and height of release. A high and a flat throw can land in the same place, but
+    the wind blows a high throw farther. Outcome: landing place, sideways and forwards (m).
     """
     ranges = Box(np.array([-np.pi / 3, np.pi / 18, 1.0, 0.5]), np.array([np.pi / 3, np.pi * 8 / 18, 6.0, 1.5]))
 
@@ -84,11 +84,11 @@ def toss(*, noise: float = 0.03) -> Toy:
 
 
 def crawler(*, noise: float = 0.02) -> Toy:
-    """A robot of four legs that push once in each of ten strokes; the policy is periodic.
+    """A robot crawls ten strokes; in each stroke each of its four legs pushes once.
 
     theta: phase of each leg in a stroke, where 0 equals 1, and amplitude of the swing. Phase lags between successive
-    legs drive the robot forwards, phase differences between left and right legs turn it. Outcome: its place (m) after
-    ten strokes.
+    legs drive the robot forwards; phase differences between left and right legs turn the robot. Outcome: place of the
+    robot (m) after ten strokes.
     """
     side = np.array([1.0, 0.5, -0.5, -1.0])
 
@@ -105,8 +105,8 @@ def crawler(*, noise: float = 0.02) -> Toy:
 def two_elbows(*, noise: float = 0.01) -> Toy:
     """A planar arm of three links whose elbow bends to either side by 30 degrees or more: two families of postures.
 
-    theta: shoulder, elbow, wrist; below .5 the elbow bends to the right, above .5 to the left. Each family reaches
-    nearly every place; the mean of two postures of different families lands elsewhere. Outcome: place of the hand (m).
+    theta: shoulder, elbow and wrist; below .5 the elbow bends to the right, above .5 to the left. Each family reaches
+    nearly every place, but the mean of two postures from both families lands elsewhere. Outcome: the hand's place (m).
     """
     lengths = np.array([0.5, 0.4, 0.1])
 
@@ -125,8 +125,7 @@ def two_elbows(*, noise: float = 0.01) -> Toy:
 def spatial_arm(*, noise: float = 1.0) -> Toy:
     """An arm that turns about the vertical and bends in five joints, with links of 20 cm.
 
-    theta: the turn, within +-150 degrees, and five bends, within +-60 degrees. Outcome: place of the hand (cm) in three
-    dimensions.
+    theta: the turn, within +-150 degrees, and five bends, within +-60 degrees. Outcome: the hand's x, y, height (cm).
     """
 
     def hand(context: Array, theta: Array) -> Array:

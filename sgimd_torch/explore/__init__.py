@@ -1,1 +1,1 @@
-"""Global exploration: movements where the inverse model knows nothing (section 4.4.1)."""
+"""Global exploration: movements that do not depend on the goal (section 4.4.1)."""

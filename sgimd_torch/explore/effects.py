@@ -1,8 +1,8 @@
-"""Effects: the movements that changed something, for robots with many movements that change nothing.
+"""Effects: the exemplars whose movement had an effect, for robots most of whose movements have none.
 
-Our addition. A movement that misses an object leaves it as it was. So the outcomes of all movements without an
-effect lie on one plateau: they depend on the context alone. The plateau is found by RANSAC (Fischler & Bolles 1981), as
-an affine map of the context. It goes through few exemplars, and it fits as many other exemplars as possible.
+Our addition. A movement that misses an object does not move it. So the outcomes of all movements without an effect lie
+on one plateau: they depend on the context alone. RANSAC (Fischler & Bolles 1981) finds the plateau: of many affine maps
+of the context, each through a few random exemplars, it takes the one that fits most other exemplars.
     effects = Effects(memory, problem.outcome_noise); acted = effects()
 """
 
@@ -15,35 +15,35 @@ import numpy as np
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, stream
 
-_FIRST, _GROWTH = 16, 1.5  # exemplars at the first look for a plateau, and the growth factor from look to look
-_GUESSES: Final = 50  # number of candidate maps, each from as few exemplars as determine it
-_GUESSED_ON: Final = 300  # number of exemplars, drawn from all, that the candidates are compared on
-_REFINED: Final = 5  # number of fits of the best map by least squares
-_NEAR, _WITHIN = 2.0, 4.0  # sd of the noise within which nearly all and all points of a plateau lie
-_ROUNDING: Final = 1e-9  # noise of an environment without noise, relative to the spread of outcomes
-_LEAST, _SHARE = 16, 0.1  # a plateau must hold so many exemplars, and such a share of all
+_FIRST, _GROWTH = 16, 1.5  # number of exemplars at the first search for a plateau; its growth until the next search
+_GUESSES: Final = 50  # number of candidate maps, each through the least number of exemplars that determine a map
+_GUESSED_ON: Final = 300  # largest number of random exemplars on which the candidates are compared
+_REFINED: Final = 5  # number of least squares fits that refine the best map
+_NEAR, _WITHIN = 2.0, 4.0  # sd from a plateau: nearly all of its points lie within the first, all within the second
+_ROUNDING: Final = 1e-9  # assumed noise if an environment has none, relative to the spread of outcomes
+_LEAST, _SHARE = 16, 0.1  # least number of exemplars on a plateau, and least share of all exemplars
 # Of the points within 4 sd of a plateau, at least this share must lie within 2 sd. Without a plateau, about half do.
 _DENSE: Final = 0.9
 
 
 class Effects:
-    """Exemplars with an effect. They depend on the memory alone, and nothing is drawn from a stream of the problem.
+    """Exemplars with an effect; they depend only on the arguments, because the random stream has a fixed seed.
 
     Args:
         memory: exemplars of the learner.
-        outcome_noise: standard deviation of each outcome dimension, in its unit.
+        outcome_noise: standard deviation of each outcome dimension, in the unit of T.
     """
 
     def __init__(self, memory: Memory, outcome_noise: float) -> None:
         self.memory = memory
         self.noise = outcome_noise * np.sqrt(memory.outcome_dim)
-        self._looked = 0  # exemplars at the last look for a plateau
+        self._looked = 0  # number of exemplars at the last search for a plateau
         self._plateau: Array | None = None  # (1 + context_dim, outcome_dim)
         self._seen = 0
 
     def __call__(self) -> Memory | None:
-        """Memory with copies of the exemplars with an effect; perhaps empty, and a new object when the plateau changed.
-        If there is no plateau, None, because then every movement has an effect."""
+        """Memory of the exemplars with an effect, perhaps empty; None if there is no plateau, because then every
+        movement has an effect. The memory is a new object after each search for a plateau."""
         n, size = len(self.memory), float(_FIRST)
         while size * _GROWTH <= n:
             size *= _GROWTH

@@ -1,8 +1,8 @@
-"""Global exploration where most movements do nothing: find movements with an effect, and vary them.
+"""Global exploration if most movements have no effect: find movements with an effect, and vary them.
 
-Our addition. Forestier et al. (2022) reach goals for an object by variations of movements that had moved it. Go-Explore
-(Ecoffet et al. 2021) returns to a state before it explores. The width of variations follows the share of variations
-that keep the effect, like the success rule of evolution strategies (Rechenberg 1973).
+Our addition. Forestier et al. (2022) reach goals for an object by variations of movements that moved the object.
+Go-Explore (Ecoffet et al. 2021) returns to a state before it explores. Variations become wider after a variation with
+an effect, else narrower, as by the success rule of evolution strategies (Rechenberg 1973).
     explore = Returning(problem); theta = explore(context)
 """
 
@@ -16,20 +16,21 @@ from sgimd_torch.explore.widening import Widening, Width
 from sgimd_torch.parts import Explore, Inverse, Problem
 from sgimd_torch.spaces import Array
 
-_ENOUGH: Final = 16  # least number of effects from which an inverse model can learn
-_SHARE: Final = 0.1  # share of global movements once there are enough effects; more would blur the inverse model
-_ANYWHERE: Final = 0.5  # share of the global movements that look anywhere in Pi for other effects
-_NEAREST: Final = 10  # number of movements with an effect in the most similar contexts; one of these is varied
+_ENOUGH: Final = 16  # least number of exemplars with an effect from which an inverse model can learn
+_SHARE: Final = 0.1  # probability of a global movement once there are enough; more make the inverse model less accurate
+_ANYWHERE: Final = 0.5  # share of the global movements that are uniform in Pi, to find other effects
+_NEAREST: Final = 10  # number of movements with an effect, in the most similar contexts, of which one is varied
 
 
 class Returning(Explore):
-    """Widening movements around the middle of Pi; where effects are rare, variations of movements that had an effect.
+    """Gaussian movements around the middle of Pi; if effects are rare, variations of movements that had an effect.
 
-    While every movement has an effect, it explores as `Widening`. Otherwise it makes uniform movements in Pi. Once a
-    movement had an effect, half of the movements are variations of a movement that had an effect in a similar context.
+    While every movement has an effect, exploration is that of `Widening`. Otherwise movements are uniform in Pi until
+    one has an effect; then half of them are variations of a movement that had an effect in a similar context.
 
     Args:
-        problem: problem to learn. With an inverse model that reports no ``effects``, it always explores as `Widening`.
+        problem: problem to learn. If its inverse model reports no ``effects``, exploration is always that of
+            `Widening`.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -42,13 +43,13 @@ class Returning(Explore):
 
     @property
     def share(self) -> float | None:
-        """Share of global movements: 1 until enough of them had an effect, then a tenth. None if all movements have an
+        """Probability of a global movement: 1 until 16 movements had an effect, then .1; None if all movements have an
         effect."""
         acted = self.problem.inverse.effects()
         return None if acted is None else _SHARE if len(acted) >= _ENOUGH else 1.0
 
     def __call__(self, context: Array) -> Array:
-        """``(theta_dim,)`` the next movement."""
+        """The next movement ``(theta_dim,)``."""
         acted, policies = self.problem.inverse.effects(), self.problem.policies
         if acted is None:
             return self._widening(context)

@@ -1,10 +1,10 @@
 """Global exploration around the middle of Pi; its width grows while outcomes are predicted well.
 
 Our addition. Rolf, Steil & Gienger (2010) begin goal babbling at one posture and widen from there, so that all
-movements belong to one family. The right width depends on the robot. With the fishing rod (25 dimensions), a
-movement drawn anywhere teaches nothing about other movements; with an arm of three joints, nearly everything.
+movements belong to one family. The best width depends on the robot. With the fishing rod (25 dimensions of Pi), the
+outcome of a uniform movement tells nothing about other movements; with an arm of three joints it tells much.
     explore = Widening(problem); theta = explore(context)
-All parts of a learner share one `Width`; the search `Vary` uses half of it around a copied movement.
+All parts of a learner share one `Width`; the search `Vary` uses it for variations of remembered movements.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from sgimd_torch.parts import Explore, Inverse, Problem
 from sgimd_torch.spaces import Array
 
 _FIRST, _NARROWEST, _WIDEST = 0.1, 0.03, 0.3  # standard deviations, relative to the sides of Pi
-_FACTOR: Final = 1.15  # ratio of one width to the next
+_FACTOR: Final = 1.15  # factor by which the width changes after each prediction
 _WELL: Final = 0.1  # largest squared error of a good prediction, relative to the variance of the outcomes
 _LOOKED_AT: Final = 1000  # largest number of exemplars from which the variance of the outcomes is computed
 
 
 class Width:
-    """Standard deviation of exploration, relative to the sides of Pi; it grows while outcomes are predicted well."""
+    """Width ``sd`` of exploration: standard deviation of movements, relative to the sides of Pi."""
 
     def __init__(self) -> None:
         self.sd = _FIRST
@@ -37,19 +37,19 @@ class Widening(Explore):
     """Gaussian movements around the middle of Pi, wider while outcomes are predicted well.
 
     Args:
-        problem: problem to learn. With an inverse model that predicts nothing, the width stays.
+        problem: problem to learn. If its inverse model predicts nothing, the width is constant.
     """
 
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)
         self.width = problem.shared(Width, Width)
-        self._expected: tuple[int, Array] | None = None  # row and expected outcome of the last movement
+        self._expected: tuple[int, Array] | None = None  # row and expected outcome of the last global movement
         inverse = type(problem.inverse)
         if inverse.predict is Inverse.predict:
             problem.remarks.append(f"exploration does not widen: {inverse.__name__} predicts nothing")
 
     def __call__(self, context: Array) -> Array:
-        """``(theta_dim,)`` the next movement."""
+        """The next movement ``(theta_dim,)``."""
         self._compare()
         policies = self.problem.policies
         middle = (policies.low + policies.high) / 2
@@ -59,7 +59,7 @@ class Widening(Explore):
         return theta
 
     def _compare(self) -> None:
-        """Update the width if the last movement was a global one."""
+        """Update the width by the outcome of the last global movement, once it is known."""
         outcomes = self.problem.memory.outcomes
         if self._expected is None or self._expected[0] >= len(outcomes):
             return

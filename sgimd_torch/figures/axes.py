@@ -1,6 +1,6 @@
 """Axes of figures: limits, labels, colour bars, notes.
 
-Each function draws on the axes that it gets.   mesh = ax.pcolormesh(x, y, z); colour_bar(ax, mesh, "error (m)")
+Functions with an argument ``ax`` draw on it.   mesh = ax.pcolormesh(x, y, z); colour_bar(ax, mesh, "error (m)")
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ LEGEND: Final[dict[str, Any]] = {
 
 
 def limits(points: Array, space: Box) -> Box:
-    """The box around points, in round numbers. Far points do not count, so that no single point shrinks the map.
+    """The box around points without outliers, with corners in round numbers.
 
-    A point is far if, in a dimension, its distance from the middle half of the distinct points is more than 1.5 times
-    the width of that half (Tukey's fence).
+    A point is an outlier if, in some dimension, its distance from the interquartile range of the distinct points is
+    more than 1.5 times the width of this range (Tukey's fence).
 
     Args:
         points: ``(n, dim)``, n >= 1, finite.
-        space: T, which has the names and the unit.
+        space: T, from which the box has its names and its unit.
     """
     lower, upper = np.quantile(np.unique(points, axis=0), (0.25, 0.75), axis=0)
     fence = 1.5 * (upper - lower)
@@ -47,13 +47,13 @@ def limits(points: Array, space: Box) -> Box:
 
 
 def rounded(length: float) -> float:
-    """``length`` rounded up to 1, 2 or 5 times a power of ten."""
+    """The least 1, 2 or 5 times a power of ten that is not below ``length``."""
     power = 10.0 ** np.floor(np.log10(length))
     return float(power * next(k for k in (1, 2, 5, 10) if power * k >= length))
 
 
 def alike(sides: Array) -> bool:
-    """Whether a picture can show these sides at one scale: the longest is at most 8 times the shortest."""
+    """Whether a picture can show ``sides`` at one scale: the longest is at most 8 times the shortest."""
     return bool(np.max(sides) <= 8 * np.min(sides))
 
 
@@ -65,7 +65,7 @@ def over_movements(ax: Axes, label: str) -> None:
 
 
 def colour_bar(ax: Axes, drawn: ScalarMappable, label: str, *, extend: str = "neither") -> Colorbar:
-    """Add a colour bar for ``drawn``, as large as ``ax``; ``extend`` names the ends with an arrow."""
+    """Add a colour bar for ``drawn`` beside ``ax``; ``extend`` says which ends are arrows: "neither", "max" ..."""
     figure = ax.get_figure()
     assert figure is not None
     return figure.colorbar(drawn, ax=ax, label=label, extend=extend)

@@ -1,7 +1,7 @@
 """Maps of T: outcomes, interest, competence, errors.
 
-Sections 5.2 and 6 of Nguyen & Oudeyer (2014). Each function draws on the axes that it gets and returns what it drew;
-the caller owns the figure, its size and its file.   landing_points(ax, outcomes, box, section)
+Sections 5.2 and 6 of Nguyen & Oudeyer (2014). Each map is drawn on axes ``ax`` of the caller, who makes and saves the
+figure.   landing_points(ax, outcomes, box, section)
 """
 
 from __future__ import annotations
@@ -37,21 +37,21 @@ def landing_points(
 
     Args:
         ax: axes, which get a colour bar.
-        outcomes: ``(n, outcome_dim)``; squares at the edge of ``box`` are outcomes outside it, and a note counts them.
+        outcomes: ``(n, outcome_dim)``; outcomes outside ``box`` are squares at its edge, and a note has their number.
         box: part of T to show.
         section: dimensions to show.
         demonstrated: ``(n, outcome_dim)`` demonstrated outcomes, each drawn once as a cross.
         side: side of a tile, in the unit of T.
 
     Returns:
-        Tiles; their array holds the counts, ``(n_y, n_x)``, masked where 0.
+        Tiles, whose array holds the number of outcomes on each, ``(n_y, n_x)``, masked where it is 0.
     """
     shown, (x, y) = section.box, section.points(outcomes).T
     n_tiles = np.maximum(1, np.round(shown.sides / section.tile(side))).astype(int)
     counts, *edges = np.histogram2d(x, y, bins=n_tiles, range=np.stack((shown.low, shown.high), axis=1))
     tiles = np.ma.masked_equal(counts.T, 0)
     norm = LogNorm(1, max(2, float(tiles.filled(0).max())))
-    blues = ListedColormap(colormaps["Blues"](np.linspace(0.25, 1.0, 256)))  # even a single point is visible on white
+    blues = ListedColormap(colormaps["Blues"](np.linspace(0.25, 1.0, 256)))  # a single outcome is visible on white, too
     mesh = ax.pcolormesh(*edges, tiles, norm=norm, cmap=blues)
     same_scale = box.dim == 2 and alike(box.sides)
     label = f"movements on a tile of {box.amount(side)}" if same_scale else "movements on a tile"
@@ -75,7 +75,7 @@ def landing_points(
 def interest_map(
     ax: Axes, lows: Array, highs: Array, interests: Array, section: Section, *, goals: Array
 ) -> PatchCollection:
-    """Regions of the interest map, coloured by interest, eq. (3); recent goals as points.
+    """Regions of the interest map, coloured by interest, eq. (3), with recent goals as points.
 
     Args:
         ax: axes, which get a colour bar.
@@ -85,7 +85,7 @@ def interest_map(
         goals: ``(n, outcome_dim)``.
 
     Returns:
-        One rectangle for each region that is shown, in the order of the regions, with the interests as array.
+        Rectangles, one for each region that is shown, in the order of the regions; their array holds the interests.
     """
     drawn = _regions_in(ax, lows, highs, interests, section, "Oranges", (0, max(float(interests.max()), 1e-6)))
     colour_bar(ax, drawn, "interest: recent change of competence")
@@ -95,12 +95,13 @@ def interest_map(
 
 
 def competence_map(ax: Axes, lows: Array, highs: Array, competences: Array, section: Section) -> PatchCollection:
-    """Regions of the interest map, coloured by mean competence, eqs. (2) and (7): 0 met, -1 no better than rest.
+    """Regions of the interest map, coloured by mean competence, eqs. (2) and (7).
 
-    The colours span the range of these competences, rounded outwards.
+    Competence is 0 if goals are met, and -1 if outcomes are no better than ``rest``. The colours span the range of the
+    competences, rounded outwards.
 
     Args:
-        ax, lows, highs, section: arguments of ``interest_map``.
+        ax, lows, highs, section: arguments as for ``interest_map``.
         competences: ``(n_regions,)``; NaN for a region without goals, which stays white.
     """
     known = competences[np.isfinite(competences)]
@@ -115,7 +116,7 @@ def competence_map(ax: Axes, lows: Array, highs: Array, competences: Array, sect
 
 
 def misses(ax: Axes, goals: Array, errors: Array, space: Box, section: Section, most: float) -> None:
-    """Goals of an evaluation, coloured by their error; if T has one dimension, the error is the height instead.
+    """Goals of an evaluation, coloured by their error; if T has one dimension, the y axis shows the error instead.
 
     Args:
         ax: axes, which get a colour bar.
@@ -123,7 +124,7 @@ def misses(ax: Axes, goals: Array, errors: Array, space: Box, section: Section, 
         errors: ``(n,)``, in the unit of T.
         space: T.
         section: dimensions to show.
-        most: error at the end of the colours.
+        most: error at the upper end of the colour scale.
     """
     label = space.in_unit("distance from goal to outcome")
     if section.is_strip:
@@ -138,7 +139,7 @@ def misses(ax: Axes, goals: Array, errors: Array, space: Box, section: Section, 
 
 
 def map_after(regions: Mapping[str, np.ndarray], movements: int) -> tuple[Array, Array, Array]:
-    """The interest map after so many movements, from the columns of the table ``regions`` of a record.
+    """The interest map after ``movements`` movements, from the columns of the table ``regions`` of a record.
 
     Returns:
         Lower and upper corners, each ``(n_regions, context_dim + outcome_dim)``, and interests ``(n_regions,)``.
@@ -158,7 +159,7 @@ def _regions_in(
     colours: str,
     limits: tuple[float, float],
 ) -> PatchCollection:
-    """The regions in a ``section``, coloured by their ``values`` ``(n_regions,)``; a note says where they are cut."""
+    """The regions in a ``section``, coloured by ``values`` ``(n_regions,)``; a note has the place of the section."""
     if where := section.cut_at(lows, highs):
         note(ax, f"at {where}")
     lows, highs, met = section.cut(lows, highs)

@@ -1,6 +1,6 @@
 """Names and colours of algorithms in figures and tables.
 
-Colours after Okabe & Ito: distinct with any colour vision, and in grey.
+Colours after Okabe & Ito: distinct with any colour vision, and in greyscale.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ COLOURS: Final = {word: colour for word, (_, colour) in _DRAWN.items()}
 
 
 def label(algorithm: str) -> str:
-    """Name of an algorithm in figures; its name in the catalogue if it has no other."""
+    """Name of an algorithm in figures; if it has none, its name in the catalogue."""
     return NAMES.get(algorithm, algorithm)
 
 

@@ -1,4 +1,4 @@
-"""Figures as files: one style, one resolution. A file is written whole or not at all; the same data give the same file.
+"""Figures as files, all in one style and one resolution; equal data give equal files.
 
 save_figure(lambda: errors(data), Path("results/figures/errors"), "png", "svg")    # errors.png and errors.svg
 """
@@ -23,12 +23,12 @@ STYLE: Final[Any] = {
     "axes.spines.right": False,
     "lines.linewidth": 2,
     "legend.fontsize": 10.5,
-    "svg.hashsalt": "sgimd_torch",  # otherwise names inside an svg are random
+    "svg.hashsalt": "sgimd_torch",  # without a fixed salt, ids in an svg are random
 }
 
 
 def save_figure(draw: Callable[[], Figure], stem: Path, *kinds: str) -> list[Path]:
-    """Draw a figure in ``STYLE`` and write a file for each kind.
+    """Draw a figure in ``STYLE`` and write a file for each kind, whole or not at all.
 
     Args:
         draw: function that makes the figure.

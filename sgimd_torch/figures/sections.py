@@ -1,9 +1,10 @@
-"""Sections: pictures of T in the plane. A T of one dimension is a strip, a T of three or more has several pictures.
+"""Sections: pictures of T in the plane.
 
     for ax, section in zip(axes, sections(space), strict=True): ax.plot(*section.points(outcomes).T); section.frame(ax)
-Each pair of dimensions is a picture: the first with the second, the third with the fourth, and so on; an odd last
-dimension with the first. Points are projected. Projected regions would hide each other, so regions are cut at the
-middle of the dimensions that are not shown, those of C included.
+If T has one dimension, its picture is a strip. Otherwise each picture shows two dimensions: the first and the second,
+the third and the fourth, and so on; if their number is odd, the last picture shows the first and the last dimension.
+Points are projected. Projected regions would hide each other, so a picture shows the regions that its plane cuts: the
+plane through the middle of C and of the other dimensions of T.
 """
 
 from __future__ import annotations
@@ -24,11 +25,11 @@ _MOST_NAMED: Final = 2  # largest number of dimensions in a note; more do not fi
 
 @dataclass(frozen=True, eq=False)
 class Section:
-    """One picture.
+    """A picture of T in the plane.
 
     Args:
         space: T.
-        dims: dimensions of T along x and y; a single dimension makes a strip along x.
+        dims: dimensions of T along x and y; a single dimension gives a strip along x.
     """
 
     space: Box
@@ -41,7 +42,7 @@ class Section:
 
     @property
     def box(self) -> Box:
-        """The part of T in the picture, as a box of two dimensions; a strip has the height 1."""
+        """The part of T that the picture shows, as a box of two dimensions; a strip has the height 1."""
         names = tuple(self.space.axis(k) for k in self.dims)
         flat = self._flat(self.space.low, 0.0), self._flat(self.space.high, 1.0)
         return Box(*flat, (*names, "") if self.is_strip else names)
@@ -51,23 +52,23 @@ class Section:
         return self._flat(outcomes, 0.5)
 
     def tile(self, side: float) -> Array:
-        """``(2,)`` sides of a tile: ``side`` along x, and the same along y if x and y have one scale."""
+        """``(2,)`` sides of a tile: ``side`` along x, and also along y if x and y have one scale."""
         sides = self.box.sides
         return np.array([side, 1.0 if self.is_strip else side if alike(sides) else side * sides[1] / sides[0]])
 
     def height(self, width: float) -> float:
-        """Height of axes that are ``width`` wide, for this picture."""
+        """Height of the axes of this picture if they are ``width`` wide."""
         shape = float(self.box.sides[1] / self.box.sides[0]) if alike(self.box.sides) else 1.0
         return width * (0.5 if self.is_strip else min(max(shape, 0.5), 1.5))
 
     def cut(self, lows: Array, highs: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-        """Cut regions at the middle of the dimensions that the picture does not show.
+        """Regions in the picture: a cut through the middle of the dimensions that the picture does not show.
 
         Args:
             lows, highs: ``(n, context_dim + outcome_dim)`` corners of regions.
 
         Returns:
-            Lower and upper corners, each ``(n_met, 2)``, of the regions that the cut meets; and their mask ``(n,)``.
+            Lower and upper corners, each ``(n_met, 2)``, of the regions that the cut meets, and their mask ``(n,)``.
         """
         context_dim, middle = lows.shape[1] - self.space.dim, (lows.min(axis=0) + highs.max(axis=0)) / 2
         inside = (lows <= middle) & (middle < highs)
@@ -78,7 +79,7 @@ class Section:
         return self._flat(lows[met, context_dim:], 0.0), self._flat(highs[met, context_dim:], 1.0), met
 
     def cut_at(self, lows: Array, highs: Array) -> str:
-        """The place of ``cut`` in words; "" if the picture shows all dimensions."""
+        """Text with the place of the cut, such as "z = 0.5"; "" if the picture shows all dimensions."""
         context_dim, middle = lows.shape[1] - self.space.dim, (lows.min(axis=0) + highs.max(axis=0)) / 2
         names = [f"context {k}" for k in range(context_dim)] + [self.space.axis(k) for k in range(self.space.dim)]
         hidden = [k for k in range(len(names)) if k - context_dim not in self.dims]
@@ -102,7 +103,7 @@ class Section:
 
 
 def sections(space: Box) -> list[Section]:
-    """The pictures of T, which show each dimension once or more.
+    """The pictures of T; together they show every dimension.
 
     Raises:
         ValueError: T has no dimension.

@@ -1,7 +1,7 @@
 """The forward model (not in the paper): networks that predict the outcome of a movement.
 
 All parts of a learner share one `ForwardModel`, see `shared`. The inverse models `ProvedModel` and `ModelAlone` and the
-search `GradientSearch` use it. All of them need torch.
+search `GradientSearch` use this model. This folder needs torch.
 """
 
 try:

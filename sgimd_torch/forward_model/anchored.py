@@ -1,8 +1,8 @@
 """Anchored predictions of the forward model, corrected by its errors at similar executed movements, the anchors.
 
-Not in Nguyen & Oudeyer (2014). With one anchor k the prediction is tau_k + L(theta) - L(theta_k). With many
-anchors, the correction is a Gaussian process of the network's errors there; its variance grows far from anchors. A
-network is wrong where few movements were executed, and without this variance a search ends at just those places.
+Not in Nguyen & Oudeyer (2014). With one anchor k the prediction is tau_k + L(theta) - L(theta_k). With many anchors, a
+Gaussian process fitted to the network's errors at the anchors is added to L(theta); its variance grows far from
+anchors. Networks are wrong where few movements were executed; without this variance a search would end there.
     near = Anchored(model, policies, context, ...); theta = near.descend(candidates, goals, steps=40, step=0.005)
 """
 
@@ -15,20 +15,20 @@ import torch
 from sgimd_torch.forward_model.model import ForwardModel
 from sgimd_torch.spaces import Array, Box
 
-# All numbers are without a unit: lengths come from the data, so the unit of T does not matter.
-_REACH: Final = 0.08  # length scale of a correction, relative to the sides of Pi and to the square root of theta_dim
-# Weight of the model's predicted variances, of noise and of disagreement. A network that has not learnt enough takes
-# its own errors for noise (late in a run on the fishing rod twice the true deviation, earlier even more). With the
-# whole variance the anchors would not correct the network.
+# All numbers are relative to Pi or to the spread of outcomes, so the unit of T does not matter.
+_REACH: Final = 0.08  # length scale of the process, relative to the sides of Pi times the square root of theta_dim
+# Weight of the variances that the model predicts, of noise and of disagreement between members. A network that has not
+# learnt enough takes its own errors for noise: late in a run on the rod it predicts twice the true standard deviation,
+# earlier even more. With weight 1 the anchors would hardly correct the network.
 _SHARE: Final = 0.1
-# Weight of the correction's variance against the squared distance. The expectation has weight 1, but the minimum over
-# many candidates selects those whose prediction error is favourable.
+# Weight of the process's variance when it is added to the squared distance. The expected squared distance has weight 1,
+# but the best of many candidates is often one whose prediction is too good.
 _CAUTION: Final = 10.0
-_LEAST_NOISE: Final = 0.003  # fraction of the spread of outcomes; below, the covariance of equal anchors is singular
+_LEAST_NOISE: Final = 0.003  # relative to the spread of outcomes; with less, equal anchors make a singular covariance
 
 
 class Anchored:
-    """Expected squared distance of n candidates from their goals, and descent on it.
+    """Expected squared distances of n candidates from their goals, and gradient descent on these distances.
 
     Args:
         model: forward model, trained.
@@ -52,7 +52,7 @@ class Anchored:
         with torch.no_grad():
             means, variances = model.landing(self.tensor(contexts), thetas_there)
             missed, noise = self.tensor(outcomes) - means.mean(dim=0), _SHARE * variances.mean(dim=(0, -1))
-            # Far from all anchors at least the held-out error is assumed.
+            # Far from all anchors, the assumed error is at least the error on held-out exemplars.
             doubt = (missed**2).mean(dim=(1, 2), keepdim=True).sqrt().clamp(min=model.missed * spread)
             covariance = doubt**2 * self._kernel(torch.cdist(self._placed, self._placed) ** 2)
             noise = noise + (_LEAST_NOISE * spread) ** 2
@@ -64,8 +64,8 @@ class Anchored:
         return torch.tensor(values, dtype=torch.float32, device=self.model.input_mean.device)
 
     def predict(self, theta: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Expected outcomes ``(n, outcome_dim)`` of ``theta`` ``(n, theta_dim)``, and their variances ``(n,)``: noise,
-        disagreement of the members, and the weighted variance of the correction."""
+        """Expected outcomes ``(n, outcome_dim)`` of ``theta`` ``(n, theta_dim)``, and their variances ``(n,)``: the
+        weighted sum of noise, disagreement between members, and variance of the process."""
         means, variances = self.model.landing(self.context, theta)
         landing = means.mean(dim=0)
         spread = _SHARE * (variances.mean(dim=0) + means.var(dim=0, correction=0)).sum(dim=-1)
@@ -78,7 +78,7 @@ class Anchored:
         return landing + correction, spread + landing.shape[-1] * _CAUTION * doubt
 
     def expected(self, theta: torch.Tensor, goals: torch.Tensor) -> torch.Tensor:
-        """Squared distances ``(n,)`` to ``goals`` plus variances, so that reliable movements are preferred."""
+        """Squared distances ``(n,)`` of expected outcomes from ``goals``, plus the variances of the outcomes."""
         landing, spread = self.predict(theta)
         return ((landing - goals) ** 2).sum(dim=-1) + spread
 
@@ -98,7 +98,8 @@ class Anchored:
             goals: ``(n, outcome_dim)``, or one goal for all candidates.
             steps: number of steps.
             step: approximate length of a step in each parameter, relative to the sides of Pi.
-            radius: largest distance from the start, root mean square over the parameters, in sides; None: no limit.
+            radius: largest distance from the start (root mean square over the parameters, relative to the sides of Pi);
+                None: no limit.
         """
         start = theta
         mean, square = torch.zeros_like(theta), torch.zeros_like(theta)
@@ -119,6 +120,6 @@ class Anchored:
 
 
 def within(start: torch.Tensor, theta: torch.Tensor, sides: torch.Tensor, radius: float) -> torch.Tensor:
-    """``theta``, moved into the trust region of ``radius`` around ``start`` (root mean square, in ``sides``)."""
+    """``theta``, moved into the trust region around ``start``; its ``radius`` is explained in `Anchored.descend`."""
     change, longest = (theta - start) / sides, radius * theta.shape[-1] ** 0.5
     return start + sides * change * (longest / change.norm(dim=-1, keepdim=True).clamp(min=longest))

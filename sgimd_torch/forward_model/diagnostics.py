@@ -1,7 +1,7 @@
-"""Calibration of the forward model: a check of its predicted spread.
+"""Calibration of the forward model: do outcomes lie in its predicted regions as often as they should?
 
-Not in Nguyen & Oudeyer (2014). Use predictions that were made before the model learnt from their outcomes (prequential
-analysis: Dawid, J. R. Stat. Soc. A 147, 1984); on its training exemplars any model looks good.
+Not in Nguyen & Oudeyer (2014). Predictions must be made before the model learns from the outcomes (prequential
+analysis: Dawid, J. R. Stat. Soc. A 147, 1984), because on its training exemplars any model looks good.
     spread = np.hypot(prediction.epistemic, prediction.aleatoric); coverage(outcomes, prediction.mean, spread, 0.8)
 """
 
@@ -13,10 +13,10 @@ from sgimd_torch.spaces import Array
 
 
 def coverage(observed: Array, mean: Array, spread: Array, level: float) -> float:
-    """Share of the outcomes inside the regions that are expected to contain the share ``level``.
+    """Share of the outcomes that lie in their predicted regions, which should contain the share ``level``.
 
-    The regions are ellipsoids along the axes, of a Gaussian with independent dimensions. A share below the level means
-    that the model is overconfident, a share above the level that the model is too cautious.
+    The regions are ellipsoids, because the predictions are Gaussians with independent dimensions. A share below
+    ``level`` means that the predicted standard deviations are too small, a share above that they are too large.
 
     Args:
         observed: ``(n, outcome_dim)`` outcomes, n >= 1.

@@ -1,7 +1,7 @@
-"""An ensemble of networks; each predicts a value and its noise. One batched product per layer computes all networks.
+"""An ensemble of networks; each network predicts a value and its noise.
 
-Deep ensembles (Lakshminarayanan, Pritzel & Blundell, NeurIPS 2017). It is a plain LightningModule, which any loop of
-Lightning can train; ``model.py`` trains it online.
+Deep ensembles (Lakshminarayanan, Pritzel & Blundell, NeurIPS 2017). One batched matrix product per layer computes all
+networks. `Ensemble` is a plain LightningModule, which any loop of Lightning can train; ``model.py`` trains it online.
     means, log_variances = Ensemble(25, 2, torch.Generator(), members=3)(inputs)
 """
 
@@ -14,8 +14,8 @@ from typing import Final
 import torch
 from lightning import LightningModule
 
-_HIDDEN: Final = (64, 64)  # units of each hidden layer
-_LOG_VARIANCES: Final = (-9.0, 3.0)  # bounds for standardised outcomes: noise of 1 % to 450 % of their spread
+_HIDDEN: Final = (64, 64)  # number of units of each hidden layer
+_LOG_VARIANCES: Final = (-9.0, 3.0)  # bounds: the noise is 1 % to 450 % of the spread of outcomes
 
 
 class Ensemble(LightningModule):
@@ -26,10 +26,10 @@ class Ensemble(LightningModule):
         n_outputs: dimension of the outputs.
         generator: random stream of the weights.
         members: number of networks, which differ in their first weights.
-        noise_heads: true: the predicted noise depends on the input; false: it is one number for each output.
+        noise_heads: true: the predicted noise depends on the input; false: each output has one noise for all inputs.
         lr: learning rate of Adam.
-        beta: exponent of the noise variance in the weights of the loss. With 0 the loss is the likelihood; with .5
-            outputs of noisy inputs are learnt, too (Seitzer et al., ICLR 2022).
+        beta: exponent; the loss of an exemplar is its negative log likelihood times (noise variance)^beta. With 0 noisy
+            exemplars hardly count; with .5 they are learnt, too (Seitzer et al., ICLR 2022).
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class Ensemble(LightningModule):
         return (loss * (self.beta * log_variance).exp().detach()).mean()
 
     def configure_optimizers(self) -> torch.optim.Optimizer:
-        """Adam, which updates all weights in one kernel."""
+        """Adam, in the fused implementation."""
         return torch.optim.Adam(self.parameters(), lr=self.lr, fused=True)
 
 

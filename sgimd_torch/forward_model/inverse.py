@@ -1,7 +1,7 @@
-"""Inverse by the forward model: a descent from the nearest remembered movements on the expected distance to the goal.
+"""Inverse model by the forward model: gradient descent on the expected squared distance from the goal.
 
-Not in Nguyen & Oudeyer (2014), whose inverse model, eqs. (8) and (9), uses remembered outcomes only. Here candidates
-descend the expected squared distance to the goal, predicted noise included, so a reliable movement is preferred.
+Not in Nguyen & Oudeyer (2014), whose inverse model, eqs. (8) and (9), uses remembered outcomes only. The descent starts
+at remembered movements. The expected distance includes the predicted noise, so reliable movements are preferred.
     inverse = ModelInverse(problem); inverse(context, goal).theta
 """
 
@@ -19,20 +19,20 @@ from sgimd_torch.inverses.locally_linear import LocallyLinear
 from sgimd_torch.parts import Problem
 from sgimd_torch.spaces import Array, Estimate
 
-_NEAREST: Final = 10  # number of candidates beside the first estimate: the remembered movements nearest to the goal
-_ANCHORS: Final = 40  # number of neighbours in policy space that correct the predictions for a candidate
+_NEAREST: Final = 10  # number of remembered movements, nearest to the goal, at which a descent starts
+_ANCHORS: Final = 40  # number of anchors of a candidate: its neighbours in policy space
 # Number of steps, and their size relative to the sides of Pi. Many small steps end nearer to the start than few large
 # steps.
 _STEPS, _STEP = 40, 0.005
-_GOALS_PER_BATCH: Final = 64  # memory of about 50 MB
+_GOALS_PER_BATCH: Final = 64  # number of goals that are computed together, in about 50 MB
 
 
 class ModelInverse(ThroughModel):
-    """Best end of descents through the model, which begin at the estimate of `LocallyLinear` and at the nearest
-    remembered movements.
+    """Best result of gradient descents through the forward model.
 
-    It never trains the model, so that an evaluation changes nothing: call ``model.refresh(memory)`` in the loop that
-    adds to the memory. Until the model is trusted, the answer is that of `LocallyLinear`.
+    The descents start at the estimate of `LocallyLinear` and at the nearest remembered movements. Until the model is
+    trusted, the answer is that of `LocallyLinear`. Answers never train the model, so that an evaluation changes
+    nothing; the loop that adds to the memory calls ``model.refresh(memory)``.
 
     Args:
         problem: problem to learn.
@@ -44,11 +44,11 @@ class ModelInverse(ThroughModel):
         self.start = LocallyLinear(problem)
 
     def __call__(self, context: Array, goal: Array) -> Estimate:
-        """The candidate with the least expected distance, with the exemplars of the estimate of `LocallyLinear`."""
+        """The theta with the least expected distance, and the exemplars of the estimate of `LocallyLinear`."""
         return self.answer_many(context[None], goal[None])[0]
 
     def answer_many(self, contexts: Array, goals: Array) -> list[Estimate]:
-        """Estimates for ``goals`` ``(n, outcome_dim)``; in one context several times faster than one by one."""
+        """Estimates for ``goals`` ``(n, outcome_dim)``; if all have one context, many times faster than one by one."""
         estimates = [self.start(*each) for each in zip(contexts, goals, strict=True)]
         if not self.trusted:
             return estimates
@@ -100,7 +100,7 @@ class ModelInverse(ThroughModel):
 
 
 class ModelAlone(ModelInverse):
-    """Locally linear model while learning; forward model in evaluations, tested or not (extra forward).
+    """Locally linear model while learning; untested forward model in evaluations (extra forward).
 
     Args:
         problem: problem to learn.

@@ -1,4 +1,4 @@
-"""The forward model in a run: training, a record of its predictions, and messages about its use.
+"""The forward model in a run: training, tables of its predictions in the record, and messages about its use.
 
 A replay writes the tables again, so the tables of a resumed run are complete.
     listener = ModelListener(record, model, asked, learner.memory, seconds); listener.episode(episode, replayed=False)
@@ -19,7 +19,7 @@ from sgimd_torch.runs.process import say
 from sgimd_torch.runs.run import Listener, Seconds
 from sgimd_torch.spaces import Array, Episode
 
-LEVEL: Final = 0.8  # share of outcomes expected in the predicted regions, for the coverage on the board
+LEVEL: Final = 0.8  # share of outcomes that the predicted regions should contain, for the board's model/coverage
 NOT_ASKED: Final = "the forward model is not used, the learner goes on without it"
 
 
@@ -29,9 +29,9 @@ class ModelListener(Listener):
     Args:
         record: record of the run.
         model: forward model of the run.
-        asked: function that tells whether the learner uses the model now.
+        asked: function that returns whether the learner uses the model now.
         memory: memory of the learner.
-        seconds: clock of the run; training counts from movement 0, because a replay trains again.
+        seconds: clock of the run; it includes the training during a replay.
     """
 
     def __init__(
@@ -42,7 +42,7 @@ class ModelListener(Listener):
         self._curves: dict[str, float] = {}
 
     def episode(self, episode: Episode, replayed: bool) -> None:
-        """Refresh the model after a movement; print a message if its use changes or its training diverges."""
+        """Refresh the model after a movement; print a message if its use begins or ends, or its training diverges."""
         memory, movements = self._memory, episode.index + 1
         with self._seconds.of("model"):
             refresh = self._model.refresh(memory)
@@ -71,7 +71,7 @@ class ModelListener(Listener):
             say(f"{NOT_ASKED}: {why}")
 
     def curves(self) -> dict[str, float]:
-        """Numbers of the last refresh by tag; empty after the first call."""
+        """Numbers of the last refresh by tag of the board; empty if they were read before."""
         curves, self._curves = self._curves, {}
         return curves
 

@@ -1,6 +1,6 @@
 """Forward model L, which predicts the outcome of a movement: an ensemble of networks, trained while the robot learns.
 
-Not in Nguyen & Oudeyer (2014), who use local models only. `OnlineTrainer` trains it.
+Not in Nguyen & Oudeyer (2014), who use local models only. `OnlineTrainer` trains the networks.
     model = ForwardModel(0, 25, 2, seed=3); model.refresh(memory); model.predict(contexts, thetas).mean
 """
 
@@ -24,9 +24,9 @@ from sgimd_torch.forward_model.training import OnlineTrainer
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, check_count, check_vector, stream
 
-TRUSTED_UP_TO: Final = 0.25  # relative error
+TRUSTED_UP_TO: Final = 0.25  # largest relative error of a model that is used
 _FEWEST_EXEMPLARS: Final = 50  # least number of exemplars for the first refresh
-_DIVERGED_ABOVE: Final = 2.0  # relative error of a diverged model: twice the error of predicting the mean
+_DIVERGED_ABOVE: Final = 2.0  # relative error above which training has diverged
 
 
 class Prediction(NamedTuple):
@@ -34,8 +34,8 @@ class Prediction(NamedTuple):
 
     Attributes:
         mean: expected outcomes.
-        epistemic: standard deviation between the members; more data would reduce it.
-        aleatoric: standard deviation of the noise that the members predict; more data would not reduce it.
+        epistemic: standard deviation of the members' expected outcomes; more exemplars would reduce it.
+        aleatoric: standard deviation of the noise that the members predict; more exemplars would not reduce it.
     """
 
     mean: Array
@@ -47,12 +47,12 @@ class Refresh(NamedTuple):
     """Result of a refresh.
 
     Attributes:
-        steps: steps of the optimiser.
-        held_out: negative log likelihood of the held-out exemplars at the end, in standardised outcomes; lower is
-            better.
-        diverged: true if the weights before the refresh were restored.
+        steps: number of steps of the optimiser.
+        held_out: negative log likelihood of the held-out exemplars after the refresh, in standardised outcomes; lower
+            is better.
+        diverged: true if training diverged and the earlier weights were restored.
         first: row of the first new exemplar.
-        predicted: prediction for the new exemplars before they were learnt from; None at the first refresh.
+        predicted: prediction for the new exemplars by the earlier weights; None at the first refresh.
     """
 
     steps: int
@@ -63,18 +63,18 @@ class Refresh(NamedTuple):
 
 
 class ForwardModel(Ensemble):
-    """(c, theta) -> outcome, with its spread; differentiable in theta through ``landing``.
+    """Prediction of the outcome of theta in a context, with its spread; ``landing`` is differentiable in theta.
 
     Args:
         context_dim: dimension of C.
         theta_dim: dimension of Pi.
         outcome_dim: dimension of T.
         seed: number from which weights and batches come; torch's global generator is not used.
-        members: number of networks; their disagreement shows what more data would improve.
+        members: number of networks; where they disagree, more exemplars would improve the prediction.
         every: number of new exemplars between two refreshes.
         rate: number of steps of the optimiser for each new exemplar; .3 steps take a fifth of the time of a movement of
             the fishing rod, 2 steps take as long as such a movement.
-        noise_heads: true: the predicted noise depends on the movement; false: it is the same for all movements.
+        noise_heads: true: the predicted noise depends on the movement; false: all movements have the same noise.
         accelerator: Lightning's name of the device for training: cpu (the fastest for these sizes), auto or cuda.
         trust: relative error above which the forward model is not used.
 
@@ -133,9 +133,9 @@ class ForwardModel(Ensemble):
 
     @property
     def relative_error(self) -> float:
-        """Error of predictions for the held-out exemplars, divided by the error of always predicting their mean. With 0
-        the model is perfect, with 1 no better than the mean; before the first refresh it is infinite. If a learner
-        repeats few movements with small variations, it is too low, as held-out exemplars have copies in training."""
+        """Error of predictions for the held-out exemplars, divided by the error of always predicting their mean: 0 if
+        the model is perfect, infinite before the first refresh. If a learner repeats few movements with small
+        variations, this value is too low, because held-out exemplars resemble training exemplars."""
         return float(self.missed) if self.trained else math.inf
 
     @property
@@ -180,9 +180,9 @@ class ForwardModel(Ensemble):
         """Learn from new and old exemplars in ``memory``; None if fewer than ``every`` exemplars are new, or all
         outcomes are equal.
 
-        Training ends early when predictions for the held-out exemplars (one in ten, never trained on) do not improve.
-        The earlier weights are restored if the loss is not finite, if the error is twice that of predicting the mean,
-        or if training is interrupted.
+        Training ends early when predictions for the held-out exemplars (one in ten, never trained on) stop improving.
+        The earlier weights are restored if the loss is not finite, if the relative error exceeds both 2 and twice
+        its earlier value, or if training is interrupted.
 
         Args:
             memory: memory of the learner; it is only read.
@@ -222,9 +222,10 @@ class ForwardModel(Ensemble):
         return Refresh(fit.steps, fit.loss, fit.diverged, seen, predicted)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write a safetensors file, whole or not at all; its header has the sizes of the model.
+        """Write a safetensors file; its header has the dimensions of the model.
 
-        The moments of the optimiser are not saved: a loaded model predicts as before, and trains with new moments.
+        The file is written whole or not at all. The moments of the optimiser are not saved: a loaded model predicts as
+        before, but training begins with new moments.
 
         Raises:
             OSError: ``path`` is a directory, or cannot be written.

@@ -1,9 +1,9 @@
-"""A forward model as inverse model once a test shows that it predicts movements as well as a local process.
+"""A forward model as inverse model, once a test shows that it predicts movements as well as a local process.
 
-Our addition, not in the paper. Before the model learns from new movements, model and process predict their outcomes,
-each from all earlier movements (prequential analysis: Dawid, J. R. Stat. Soc. A 147, 1984). The two are compared on the
-movements of which the process was surest, as answers are like these. So neither of the two tests its own answers, and
-the test needs no movements.
+Our addition, not in the paper. Before the model learns from new movements, model and process both predict their
+outcomes from the earlier movements (prequential analysis: Dawid, J. R. Stat. Soc. A 147, 1984). They are compared on
+those movements for which the process predicted the least variance, because answers are such movements. So neither of
+the two is tested on its own answers, and no movements are executed for the test.
     inverse = ProvedModel(problem); inverse.trusted
 """
 
@@ -23,19 +23,19 @@ from sgimd_torch.parts import Inverse, Problem
 from sgimd_torch.spaces import Array, Estimate
 
 _FEWEST: Final = 200  # least number of recent movements for a test
-_SUREST: Final = 10  # one in ten recent movements is compared: those of which the process was surest
-# With noise, a model with errors a tenth larger answers as well, because lucky outcomes mislead the process. Without
-# noise the model has to predict a tenth better. Measured on five tasks.
+_SUREST: Final = 10  # one in ten recent movements is compared, those with the least variance by the process
+# Largest accepted ratio of the errors of model and process, measured on five tasks. With noise, a model with errors a
+# tenth larger answers as well, because lucky outcomes mislead the process. Without noise it is 1 / 1.1.
 _NEARLY: Final = 1.1
 _TINY: Final = np.finfo(float).tiny
 _MOST: Final = 10.0  # largest ratio of errors; ratios are clipped to [1/10, 10]
 
 
 class ProvedModel(ThroughModel):
-    """Local process; a forward model once it predicts as well (extra forward).
+    """Local Gaussian process; the forward model once it predicts as well (extra forward).
 
-    The answers of the model are those of `ModelInverse`. The test is part of ``model.refresh``, so evaluations change
-    nothing.
+    The answers of the forward model are those of `ModelInverse`. The test is part of ``model.refresh``, so evaluations
+    change nothing.
 
     Args:
         problem: problem to learn.
@@ -48,7 +48,7 @@ class ProvedModel(ThroughModel):
         self._told = Memory(*problem.dims)
         earlier = problem.over(self._told)
         self._rivals = LocalProcess(earlier), ModelInverse(earlier)
-        # For each movement: its row, the expected variance of the process, the errors of process and model.
+        # For each movement: its row, the variance that the process predicts, and the errors of process and model.
         self._tests: list[tuple[int, float, float, float]] = []
         self._proved = False
         self.model.before_learning.append(self._test)
@@ -76,7 +76,7 @@ class ProvedModel(ThroughModel):
         return self.through_model if self.trusted else self.process
 
     def _test(self, memory: Memory, learnt: int) -> None:
-        """Test model and process on the movements that are new to the model; both predict from the first ``learnt``."""
+        """Test model and process, which know the first ``learnt`` movements, on the later movements."""
         for row in range(len(self._told), learnt):
             self._told.add(memory.contexts[row], memory.thetas[row], memory.outcomes[row])
         process, through_model = self._rivals
@@ -91,7 +91,7 @@ class ProvedModel(ThroughModel):
         self._proved = self._is_nearly_as_good(len(memory))
 
     def _is_nearly_as_good(self, n: int) -> bool:
-        """Whether the model predicted as well as the process, on newer movements of which the process was surest."""
+        """Whether the model predicted as well as the process, on recent movements with the least predicted variance."""
         recent = np.array([test for row, *test in self._tests if row >= n / 2])
         if len(recent) < _FEWEST:
             return False

@@ -22,16 +22,16 @@ from sgimd_torch.spaces import Array, Estimate
 _CANDIDATES: Final = 5  # number of remembered movements to start from
 _STEPS, _STEP = 5, 0.03  # number of steps of a descent, and their size relative to the sides of Pi
 _RADIUS: Final = 0.15  # first radius of the trust region, relative to the sides of Pi (root mean square)
-_RADII: Final = (0.02, 0.3)  # bounds of the radius: less is below the noise, more leaves the neighbourhood
+_RADII: Final = (0.02, 0.3)  # bounds of the radius: smaller steps are lost in the noise, larger ones leave the anchors
 
 
 class GradientSearch(Search):
-    """Gradient of a forward model; until the model is trusted, the simplex (extra forward).
+    """Gradient descent through the forward model; until the model is trusted, Nelder-Mead simplex (extra forward).
 
-    A descent from theta_g and from the movements that landed nearest plans every movement; the search never ends.
-    The anchors of predictions are the exemplars of the estimate and each new outcome. So the model's errors near the
-    goal correct the next prediction. A plan stays in a trust region, which grows when the outcome changes as predicted,
-    and shrinks when it does not.
+    Each movement is the best result of descents from theta_g and from the movements that landed nearest. The anchors of
+    predictions are the exemplars of the estimate and the movements of the search, so the model's errors near the goal
+    correct the next prediction. A descent stays in a trust region, which grows after a good prediction and shrinks
+    after a bad one. The search never ends.
 
     Args:
         problem: problem to learn.
@@ -49,7 +49,7 @@ class GradientSearch(Search):
         self.model, self.noise, self._simplex = model_of(problem), noise, NelderMead(problem)
 
     def __call__(self, start: Estimate, goal: Array) -> Generator[Array, Array, None]:
-        """Movements from ``start`` on, each planned with the outcomes of earlier ones."""
+        """Movements near ``start``; each depends on the outcomes of earlier ones."""
         if not is_asked(self.problem.inverse, self.model):
             yield from self._simplex(start, goal)
             return
@@ -59,7 +59,7 @@ class GradientSearch(Search):
         while True:
             nearest = np.linalg.norm(outcomes - goal, axis=1).argsort(kind="stable")[:_CANDIDATES]
             contexts = np.broadcast_to(start.context, (1, len(thetas), len(start.context)))
-            # All candidates share these anchors, which count as executed in this context.
+            # All candidates share these anchors, which count as if executed in the context of the goal.
             anchored = Anchored(self.model, policies, start.context, contexts, thetas[None], outcomes[None])
             theta = _best(anchored, np.vstack([first, thetas[nearest]]), goal, radius)
             theta = policies.clip(self.rng.normal(theta, self.noise * policies.sides) if self.noise else theta)
@@ -75,7 +75,7 @@ class GradientSearch(Search):
 
 
 def _best(anchored: Anchored, starts: Array, goal: Array, radius: float) -> Array:
-    """The best end ``(theta_dim,)`` of descents from ``starts`` on the expected squared distance."""
+    """The best result ``(theta_dim,)`` of descents from ``starts`` on the expected squared distance."""
     aim = anchored.tensor(goal[None])
     found = anchored.descend(anchored.tensor(starts), aim, steps=_STEPS, step=_STEP, radius=radius)
     with torch.no_grad():

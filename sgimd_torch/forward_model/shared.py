@@ -19,7 +19,7 @@ class SharedModel(Trained):
     """Forward model of a problem.
 
     Args:
-        problem: problem to learn; it gives dimensions and seed.
+        problem: problem to learn, with the dimensions and the seed of the model.
         options: options of `ForwardModel`.
     """
 
@@ -31,7 +31,7 @@ class SharedModel(Trained):
         return self.model.refresh(memory)
 
     def listener(self, life: Any) -> ModelListener:
-        """Listener that refreshes the model in this `runs.run.Life`."""
+        """Listener that refreshes the model in a run."""
         learner = life.parts.learner
         asked = partial(is_asked, learner.inverse, self.model)
         return ModelListener(life.record, self.model, asked, learner.memory, life.seconds)
@@ -44,7 +44,7 @@ def model_of(problem: Problem, **options: Any) -> ForwardModel:
 
 
 class ThroughModel(Inverse):
-    """Inverse model that uses the forward model of its problem when this model can be trusted.
+    """Inverse model that uses the forward model of its problem if the forward model can be trusted.
 
     Attributes:
         model: forward model.
@@ -62,5 +62,5 @@ class ThroughModel(Inverse):
 
 
 def is_asked(inverse: Inverse, model: ForwardModel) -> bool:
-    """Whether a learner with this ``inverse`` uses the ``model`` now; an inverse that is a `ThroughModel` decides."""
+    """Whether a learner with this ``inverse`` uses the ``model`` now; a `ThroughModel` has its own ``trusted``."""
     return inverse.trusted if isinstance(inverse, ThroughModel) else model.trusted

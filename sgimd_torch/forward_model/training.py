@@ -1,6 +1,6 @@
 """Online training: repeated fits of an ensemble to a growing set of exemplars; a fit that diverges is undone.
 
-It uses Lightning Fabric, with one optimiser for all fits, so that Adam's moments last from one fit to the next.
+The training uses Lightning Fabric, with one optimiser for all fits, so that Adam's moments last from fit to fit.
     trainer.prepare(); fit = trainer.fit(x, y, scale, steps=15, give_up=2.0)
 """
 
@@ -18,18 +18,18 @@ from sgimd_torch.forward_model.ensemble import Ensemble, nll
 _RECENT: Final = 0.25  # share of every batch that is drawn from the newest exemplars
 _BATCH: Final = 128  # number of exemplars in a step, for each member
 _HELD_OUT_EVERY: Final = 10  # every tenth exemplar is held out, that is, never trained on
-_STEPS_PER_LOOK: Final = 20  # steps of the optimiser between two looks at the held-out exemplars
-_PATIENCE: Final = 5  # number of looks without improvement after which a fit ends
+_STEPS_PER_LOOK: Final = 20  # number of optimiser steps between two tests on the held-out exemplars
+_PATIENCE: Final = 5  # number of tests without improvement after which a fit ends
 
 
 class Fit(NamedTuple):
     """Result of a fit.
 
     Attributes:
-        steps: steps of the optimiser.
+        steps: number of steps of the optimiser.
         loss: negative log likelihood of the held-out exemplars.
         relative_error: error of predictions for the held-out exemplars, see `ForwardModel.relative_error`.
-        diverged: true if the weights before the fit were restored.
+        diverged: true if the fit diverged and the earlier weights were restored.
     """
 
     steps: int
@@ -45,7 +45,7 @@ class OnlineTrainer:
     Args:
         ensemble: networks, whose weights change.
         generator: random stream of the batches; each member has batches of its own.
-        newest: number of exemplars that count as new.
+        newest: number of last exemplars that count as the newest.
         accelerator: Lightning's name of the device that trains.
     """
 
@@ -57,7 +57,7 @@ class OnlineTrainer:
     optimizer: Any = None
 
     def prepare(self) -> Fabric:
-        """Move the weights to the device for training, and make the optimiser, at the first call."""
+        """Move the weights to the device for training and make the optimiser, unless this was done before."""
         if self.fabric is None:
             self.fabric = Fabric(accelerator=self.accelerator, devices=1)
             self.ensemble.to(self.fabric.device)
@@ -66,7 +66,7 @@ class OnlineTrainer:
         return self.fabric
 
     def fit(self, x: torch.Tensor, y: torch.Tensor, scale: torch.Tensor, *, steps: int, give_up: float) -> Fit:
-        """Train until predictions for the held-out exemplars, one in ten, do not improve.
+        """Train until predictions for the held-out exemplars, one in ten, stop improving.
 
         The weights before the fit are restored if it diverges or is interrupted.
 
@@ -75,7 +75,8 @@ class OnlineTrainer:
             y: ``(n, n_outputs)`` standardised outputs.
             scale: ``(n_outputs,)`` factors that turn outputs into lengths.
             steps: largest number of steps of the optimiser, at least 1.
-            give_up: relative error above which the fit has diverged; a loss that is not finite has diverged, too.
+            give_up: relative error above which the fit has diverged. A fit with a loss that is not finite has diverged,
+                too.
         """
         fabric = self.prepare()
         is_held = torch.arange(len(x)) % _HELD_OUT_EVERY == _HELD_OUT_EVERY - 1
@@ -102,8 +103,8 @@ class OnlineTrainer:
         return Fit(done, loss, error, diverged=False)
 
     def judge(self, x: torch.Tensor, y: torch.Tensor, scale: torch.Tensor) -> tuple[float, float]:
-        """Negative log likelihood without ``beta``, mean over the members; and the error of their mean prediction,
-        divided by the error of always predicting the mean of ``y``."""
+        """Two numbers: the mean negative log likelihood of the members; and the error of their mean prediction, divided
+        by the error of always predicting the mean of ``y``."""
         with torch.no_grad():
             mean, log_variance = self.ensemble(x)
             length = scale * torch.stack([mean.mean(dim=0) - y, y.mean(dim=0) - y])
@@ -115,7 +116,7 @@ class OnlineTrainer:
         return {**self.__dict__, "fabric": None, "optimizer": None}
 
     def _draw(self, rows: torch.Tensor) -> torch.Tensor:
-        """Random rows ``(members, batch)``; the first rows of each batch are among the newest."""
+        """Random rows ``(members, batch)``; the first quarter of each batch is drawn from the newest exemplars."""
         members, recent, n_recent = self.ensemble.members, rows[-self.newest :], round(_RECENT * _BATCH)
         picked = rows[torch.randint(len(rows), (members, _BATCH), generator=self.generator)]
         picked[:, :n_recent] = recent[torch.randint(len(recent), (members, n_recent), generator=self.generator)]

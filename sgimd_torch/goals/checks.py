@@ -1,4 +1,4 @@
-"""Checks of goal models: a context lies in C, a goal in T, a competence in its range.
+"""Checks of the arguments of goal models: a context lies in C, a goal in T, a competence in its range.
 
 point = check_attempt(problem, context, goal, competence, gain)
 """
@@ -28,8 +28,8 @@ def check_attempt(problem: Problem, context: ArrayLike, goal: ArrayLike, compete
     """The point (context, goal) of C x T, ``(context_dim + outcome_dim,)``.
 
     Raises:
-        ValueError: ``context`` is not one point of C, ``competence`` not in [-1, 0], ``gain`` not in [-1, 1], or
-            ``goal`` not one point of T. A demonstrated outcome may lie outside T: check it by ``outcomes.contains``.
+        ValueError: ``context`` is not one point of C, ``goal`` is not one point of T, ``competence`` is not in [-1, 0],
+            or ``gain`` is not in [-1, 1]. Check a demonstrated outcome by ``outcomes.contains`` first.
     """
     point = check_in(problem.contexts, "context", context)
     goal = check_in(problem.outcomes, "goal", goal, "is it a demonstrated outcome? Check it by outcomes.contains first")

@@ -1,6 +1,6 @@
 """Goal interest mapping: regions of C x T, and goals where competence changes fastest.
 
-Section 3.2.1 of Nguyen & Oudeyer (2014). Regions of C x T split as goals accumulate, so that each ends up with its own
+Section 3.2.1 of Nguyen & Oudeyer (2014). A region of C x T with too many goals is split, and each half then has its own
 competence progress, eq. (3). Goals are drawn where progress is high, see `Tiling`.
     goals = InterestMap(problem); goal = goals.sample(context); goals.add(context, goal, competence)
 """
@@ -19,8 +19,8 @@ from sgimd_torch.goals.tiling import Tiling
 from sgimd_torch.parts import Goals, Problem
 from sgimd_torch.spaces import Array
 
-# Least side of a new region, as a part of its *parent's* side. An absolute bound would stop the refinement in a task
-# space 100 times larger than the reachable part.
+# Least side of a new region, relative to the side of its *parent*. A bound relative to C x T would stop the splits too
+# early if the task space is 100 times larger than the reachable part.
 _MIN_SIDE: Final = 1 / 15
 
 
@@ -29,13 +29,14 @@ class InterestMap(Goals):
 
     Args:
         problem: problem to learn.
-        g_max: largest number of goals in a region; one more goal cuts the region in two.
+        g_max: largest number of goals in a region; with one more goal, the region is split.
         window: number of recent competences in eq. (3), the paper's zeta; even, at least 4, at most ``g_max``.
         cuts: number of candidate cuts of a region in each dimension.
-        near: largest distance between a region's worst goal and goals drawn near it, relative to the region's sides.
+        near: largest distance from a region's goal of least competence at which mode 3 draws a new goal, relative to
+            the region's sides.
         max_aspect: ratio of two sides of a region, relative to C x T, beyond which the shorter side is not cut.
-            Deviation: the paper has no such rule (inf). Its regions become slivers when goals crowd in a small part of
-            a large space.
+            Deviation: the paper has no such rule (inf). Without it, regions become very thin when most goals lie in a
+            small part of a large space.
         progress: measure of progress: `gained_progress`; `absolute_progress`, which is eq. (3); `paired_progress`; or a
             function of your own.
         contrast: function (region, mask of the goals below a cut) -> difference between the two sides of the cut.
@@ -66,7 +67,7 @@ class InterestMap(Goals):
 
     @property
     def regions(self) -> list[Region]:
-        """The leaves, which tile C x T, in the order of the tree: the halves of a cut region stand in its place."""
+        """The leaves of the tree, which tile C x T; in this list the two halves of a split region take its place."""
         return list(self._tiling.regions)
 
     @property
@@ -75,7 +76,7 @@ class InterestMap(Goals):
         return self._tiling.box.sides
 
     def regions_at(self, point: Array) -> list[Region]:
-        """Regions that contain a context ``(context_dim,)`` (all regions if there are no contexts), or the region that
+        """Regions that contain a context ``(context_dim,)`` (all regions if C has no dimension), or the one region that
         contains a point of C x T."""
         return [self._tiling.regions[index] for index in np.flatnonzero(self._tiling.containing(point))]
 
@@ -102,7 +103,7 @@ class InterestMap(Goals):
             return
         cut = self._best_cut(region)
         if cut is None:
-            # Deviation: the paper leaves open what happens without a valid cut. The region forgets its oldest quarter.
+            # Deviation: the paper leaves open what happens without a valid cut. Here the oldest quarter is forgotten.
             regions[index] = region.keep(slice(len(region.goals) // 4, None))
         else:
             self._tiling.plant([*regions[:index], *region.split(*cut), *regions[index + 1 :]])
@@ -125,8 +126,8 @@ class InterestMap(Goals):
         def score(candidate: tuple[int, int]) -> tuple[float, float, int]:
             below = is_below[:, candidate[0], candidate[1]]
             balance = int(n_below[candidate]) * (n - int(n_below[candidate]))
-            # When all cuts score 0 (for example, all competences are -1), the longest side is halved, because progress
-            # that begins in a small part of a large space is only visible in a small region.
+            # If all cuts score 0, for example because all competences are -1, the longest side is halved. Progress that
+            # begins in a small part of a large space is only visible in a small region.
             return balance * self.contrast(region, below), float(shares[candidate[1]]), balance
 
         candidates = [(int(row), int(axis)) for row, axis in np.argwhere(valid)]

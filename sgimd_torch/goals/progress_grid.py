@@ -1,7 +1,7 @@
-"""A fixed grid with the interest and the choice of goals of the interest map, to measure the value of splitting.
+"""A grid of cells that never split, in place of the interest map, to measure what its splits contribute.
 
-It differs from section 3.2.1 of Nguyen & Oudeyer (2014) only in that cells never split. A grid may be as good if there
-are few dimensions and all of the task space can be reached.
+All else follows section 3.2 of Nguyen & Oudeyer (2014). A grid may be as good as the map if there are few dimensions
+and all of the task space can be reached.
     goals = ProgressGrid(problem)
 """
 
@@ -18,8 +18,8 @@ from sgimd_torch.goals.tiling import Tiling
 from sgimd_torch.parts import Goals, Problem
 from sgimd_torch.spaces import Array
 
-_DEFAULT_CELLS = 100  # a cell needs four goals before its progress is known, and a run has about 500 goals
-_MAX_CELLS = 100_000  # number above the number of goals of any run
+_DEFAULT_CELLS = 100  # number of cells; each needs four goals before its progress is known; a run has about 500 goals
+_MAX_CELLS = 100_000  # largest number of cells, more than any run has goals
 
 
 class ProgressGrid(Goals):
@@ -29,11 +29,12 @@ class ProgressGrid(Goals):
         problem: problem to learn.
         cells: number of cells in each dimension of C x T; None: about 100 in all, but at least 2 in each dimension.
         window: number of recent goals that a cell remembers; even, at least 4.
-        near: largest distance between a cell's worst goal and goals drawn near it, relative to the cell's sides.
+        near: largest distance from a cell's goal of least competence at which mode 3 draws a new goal, relative to the
+            cell's sides.
         progress: measure of progress, as in `InterestMap`.
 
     Raises:
-        ValueError: a number is out of its range, or there are so many cells that none would get four goals.
+        ValueError: a number is out of its range, or there are more cells than any run has goals.
     """
 
     def __init__(
@@ -84,7 +85,7 @@ class ProgressGrid(Goals):
     def add(
         self, context: ArrayLike, goal: ArrayLike, competence: float, strategy: str = "autonomous", gain: float = 0.0
     ) -> None:
-        """Learn the competence at a goal. Its cell forgets goals older than the window.
+        """Learn the competence at a goal. The cell of the goal forgets all but its last ``window`` goals.
 
         Raises:
             ValueError: see `Goals.add`.

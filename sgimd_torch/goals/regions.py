@@ -1,7 +1,7 @@
 """Regions of C x T, the leaves of the interest map, and their interest.
 
-Section 3.2.1 and eq. (3) of Nguyen & Oudeyer (2014): interest is local competence progress over a sliding window of
-the last goals that were attempted.    region.goals, region.competences, region.interest()
+Section 3.2.1 and eq. (3) of Nguyen & Oudeyer (2014): the interest of a region is its competence progress, over a
+sliding window of the last goals that were attempted there.    region.goals, region.competences, region.interest()
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from numpy.typing import NDArray
 from sgimd_torch.spaces import Array
 
 Progress = Callable[[Array, Array, Array], float]
-"""Function (points, competences, gains) of a window of n >= 4 goals, oldest first -> progress. Points ``(n, dim)`` lie
-in C x T. Competences ``(n,)`` were measured there when attempts ended. Gains ``(n,)`` are those of `Goals.add`."""
+"""Function (points, competences, gains) of n >= 4 goals, oldest first -> progress. Points ``(n, dim)`` of C x T are
+contexts and goals. Competences ``(n,)`` and gains ``(n,)`` are arguments of `Goals.add`, one for each goal."""
 
 
 def gained_progress(points: Array, competences: Array, gains: Array) -> float:
-    """Mean rise of the competence at each goal during its attempt.
+    """Mean rise of the competence at a goal during the attempt at this goal.
 
-    Deviation: eq. (3) compares competences of older and newer goals, which also differ because the goals differ. In
-    most regions of a large task space only some goals can be reached, and this difference hides progress.
+    Deviation: eq. (3) compares competences at older goals with competences at newer goals. If only some goals of a
+    region can be reached, as in most regions of a large task space, differences between goals hide progress.
     """
     return float(np.maximum(gains, 0).mean())
 
@@ -32,8 +32,8 @@ def gained_progress(points: Array, competences: Array, gains: Array) -> float:
 def absolute_progress(points: Array, competences: Array, gains: Array) -> float:
     """Difference between the newer and the older half of the competences, the paper's eq. (3).
 
-    |sum of newer - sum of older| over the number of values. If this number is odd, the oldest value is left out."""
-    # Deviation: the paper's two sums share their middle term; these halves are disjoint and of equal length.
+    |sum of newer - sum of older| / number of values. If the number is odd, the oldest value is left out."""
+    # Deviation: the two sums in the paper share their middle term. Here the halves are disjoint and of equal length.
     half = len(competences) // 2
     newer, older = competences[-half:], competences[-2 * half : -half]
     return abs(float(newer.sum() - older.sum()) / (2 * half))
@@ -42,9 +42,9 @@ def absolute_progress(points: Array, competences: Array, gains: Array) -> float:
 def paired_progress(points: Array, competences: Array, gains: Array) -> float:
     """Mean difference between the competence at a goal and the competence at the nearest earlier goal.
 
-    Forestier et al. (2017) and Portelas et al. (2019) measure progress in this way. It separates change in time from
-    differences between places, but does not average out the noise of single goals. Of equally near goals the latest
-    counts. Distances are measured in C x T, so contexts should be scaled to the unit of goals.
+    Forestier et al. (2017) and Portelas et al. (2019) measure progress in this way. The pairs separate change in time
+    from differences between places, but the noise of single goals is not averaged out. Of equally near goals the latest
+    counts. Distances are measured in C x T, so contexts should have the scale of goals.
     """
     n = len(points)
     apart = np.square(points[:, None] - points).sum(axis=2)  # (n, n)
@@ -56,7 +56,7 @@ def paired_progress(points: Array, competences: Array, gains: Array) -> float:
 def interest_of(points: Array, competences: Array, gains: Array, *, window: int, progress: Progress) -> float:
     """Progress over the last ``window`` goals, at ``points`` ``(n, dim)`` with ``competences`` and ``gains`` ``(n,)``.
 
-    Deviation: 0 for fewer than 4 goals, because the halves of eq. (3) then have one value or none.
+    Deviation: with fewer than 4 goals the interest is 0, because each half in eq. (3) would have one value or none.
     """
     if len(competences) < 4:
         return 0.0
@@ -70,10 +70,10 @@ def between_interests(region: Region, below: NDArray[np.bool_]) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """R_i, a leaf of the tree. It never changes: a later goal makes a new Region.
+    """R_i, a leaf of the tree. A Region is immutable: adding a goal makes a new Region.
 
-    ``path`` leads from the root "R" to "R0", its half below the cut, or "R1", its half above; "R01" is the upper half
-    of "R0". A path never changes its meaning. ``low`` and ``high`` are the corners in C x T. Arrays in order of time:
+    ``path`` is the name of the region: "R" is the root, "R0" its half below the cut, "R1" its half above the cut, and
+    "R01" the upper half of "R0". ``low`` and ``high`` are the corners in C x T. The goals are in order of time, in
     ``points`` ``(n, context_dim + outcome_dim)``, ``competences``, ``gains`` and names of ``strategies`` ``(n,)``.
     ``attempts`` also counts goals that the region forgot, but not goals that its parent forgot. Arrays are read-only.
     """
@@ -129,7 +129,7 @@ class Region:
         )
 
     def keep(self, rows: NDArray[np.bool_] | slice) -> Region:
-        """This region with some of its goals, in their order."""
+        """This region with only the goals in ``rows``."""
         return replace(
             self,
             points=self.points[rows],
@@ -139,7 +139,7 @@ class Region:
         )
 
     def split(self, axis: int, cut: float) -> tuple[Region, Region]:
-        """The halves below and above a cut; goals on the cut belong above."""
+        """The halves below and above a cut; goals on the cut belong to the upper half."""
         is_below = self.points[:, axis] < cut
         low, high = self.low.copy(), self.high.copy()
         low[axis] = high[axis] = cut

@@ -1,4 +1,4 @@
-"""Regions that tile C x T, and the choice of a goal from them; the interest map and the progress grid use both.
+"""Regions that tile C x T, and the choice of a goal from them, for the interest map and the progress grid.
 
 Section 3.2.2 and eq. (4) of Nguyen & Oudeyer (2014). A map cuts C x T into regions and gives them to a `Tiling`.
     tiling.plant(regions); goal = tiling.sample(context); index = tiling.add(context, goal, competence, strategy, gain)
@@ -16,7 +16,8 @@ from sgimd_torch.goals.regions import Progress, Region
 from sgimd_torch.parts import Problem
 from sgimd_torch.spaces import Array, Box
 
-_MODES: Final = (0.7, 0.2, 0.1)  # modes: probability of a goal where interest is high, anywhere, near a worst goal
+# Probabilities of the paper's modes: a goal where interest is high (1), anywhere (2), where competence is least (3).
+_MODES: Final = (0.7, 0.2, 0.1)
 
 
 class Tiling:
@@ -25,7 +26,8 @@ class Tiling:
     Args:
         problem: problem to learn.
         progress: function (points, competences, gains) -> interest of a region.
-        near: largest distance from the worst goal in mode 3 (near a worst goal), relative to the region's sides.
+        near: largest distance from a region's goal of least competence at which mode 3 draws a new goal, relative to
+            the region's sides.
 
     Raises:
         ValueError: a number is out of its range.
@@ -33,7 +35,7 @@ class Tiling:
 
     def __init__(self, problem: Problem, progress: Progress, *, near: float) -> None:
         if not 0 < near <= 1:
-            raise ValueError(f"near must lie in (0, 1], got {near}; it is a part of a region's sides")
+            raise ValueError(f"near must lie in (0, 1], got {near}; it is a fraction of a region's sides")
         self.problem, self._near, self._progress, self._rng = problem, near, progress, problem.stream("goals")
         contexts, outcomes = problem.contexts, problem.outcomes
         self.box = Box(np.concatenate((contexts.low, outcomes.low)), np.concatenate((contexts.high, outcomes.high)))
@@ -49,7 +51,7 @@ class Tiling:
         self.regions = regions
         self._lows = np.stack([region.low for region in regions])
         self._highs = np.stack([region.high for region in regions])
-        # Regions are half open, [low, high), but closed at the border of C x T: each point is in exactly one region.
+        # Regions are half open, [low, high), but closed at the border of C x T, so each point is in exactly one region.
         self._ends = np.where(self._highs == self.box.high, np.inf, self._highs)
 
     def add(self, context: ArrayLike, goal: ArrayLike, competence: float, strategy: str, gain: float) -> int:
@@ -70,7 +72,7 @@ class Tiling:
         low, high = region.low[dim:], region.high[dim:]
         if mode == 1 or len(region.goals) == 0:
             return self._rng.uniform(low, high)
-        # Ties are common, as competence is -1 far from all outcomes. A fixed choice would repeat one goal forever.
+        # Ties are common, as competence is -1 far from all outcomes. Without a draw one goal would be repeated forever.
         worst = self._rng.choice(np.flatnonzero(region.competences == region.competences.min()))
         step = self._near * (high - low)
         return Box(low, high).clip(region.goals[worst] + self._rng.uniform(-step, step))
@@ -87,7 +89,7 @@ class Tiling:
         here = np.flatnonzero(self.containing(context))
         interests = np.array([self.regions[index].interest() for index in here])
         weights = interests - interests.min()  # eq. (4)
-        # Deviation: eq. (4) is 0/0 if all interests are equal. Weights by size in T then make goals uniform.
+        # Deviation: eq. (4) is 0/0 if all interests are equal. Then weights are the volumes in T, so goals are uniform.
         if not weights.any():
             sides = (self._highs - self._lows)[here, self.problem.contexts.dim :]
             weights = (sides / self.problem.outcomes.sides).prod(axis=1)

@@ -1,4 +1,4 @@
-"""Goals drawn anywhere in T, whatever was learnt; a baseline for the interest map.
+"""Goals that are uniform in T and do not depend on what was learnt; a baseline for the interest map.
 
 goals = UniformGoals(problem)
 """

@@ -1,9 +1,9 @@
 """Goals within reach: uniform in a box around the reached outcomes, or in T if T is hardly larger.
 
-Our addition. If T is far larger than the reachable part, nearly all of its points are hopeless, and a learner that aims
-at them learns its most extreme movements. The box holds outcomes that can be reached again: for each movement, the mean
-outcome of similar movements counts, so lucky outcomes hardly matter. Goals also lie within a step outside the box, so
-that the box can grow. The step is wide at first, and narrows if goals in it are missed.
+Our addition. If T is far larger than the reachable part, nearly all uniform goals are out of reach, and a learner that
+aims at them learns only its most extreme movements. The box holds outcomes that can be reached again: each movement
+counts with the mean outcome of similar movements, so lucky outcomes hardly matter. Goals also lie within a step outside
+the box, so that the box can grow. The step is wide at first, and narrows if goals outside the box are missed.
     goals = WithinReach(problem); goal = goals.sample(context)
 """
 
@@ -18,25 +18,25 @@ from sgimd_torch.goals.uniform import UniformGoals
 from sgimd_torch.parts import Problem
 from sgimd_torch.spaces import Array
 
-_FIRST: Final = 21  # least number of exemplars; with fewer, goals are uniform in T
-_LOOKED_AT, _GROWTH = 1000, 1.05  # most exemplars that determine the box, and growth of the memory between two looks
+_FIRST: Final = 21  # least number of exemplars that determine a box; with fewer, goals are uniform in T
+_LOOKED_AT, _GROWTH = 1000, 1.05  # largest number of such exemplars; growth of the memory from one box to the next
 _ALIKE: Final = 5  # number of similar movements whose mean outcome counts; fewer while the memory is small
-_TAIL: Final = 0.02  # share of these means that is left out at each end of a dimension
+_TAIL: Final = 0.02  # share of the mean outcomes that is left out at each end of a dimension
 _NARROWEST, _WIDEST = 0.02, 0.2  # bounds of the step, relative to the box's longest side; at first the step is wider
 _WIDE_FOR: Final = 250  # number of exemplars up to which the step stays wide
-_FACTOR: Final = 1.4  # factor of the step after a hit outside the box; after a miss the step is divided by 1.4^(1/3)
-_MEDIAN: Final = 1.1  # factor of the running median of errors in the box after a larger error, else its divisor
-_ROUNDING: Final = 1e-9  # spread of outcomes that counts as none, relative to the longest side of T
-_MOST: Final = 0.7  # geometric mean of the box's sides, relative to T, from which on goals are drawn in all of T
+_FACTOR: Final = 1.4  # factor of the step after a met goal outside the box; after a missed goal 1.4^(-1/3)
+_MEDIAN: Final = 1.1  # factor by which the running median rises after a larger error, and falls after a smaller one
+_ROUNDING: Final = 1e-9  # largest spread of outcomes that counts as none, relative to the longest side of T
+_MOST: Final = 0.7  # geometric mean of the box's sides, relative to T's, from which on goals are uniform in T
 
 
 class WithinReach(UniformGoals):
     """Uniform goals in a box around the outcomes that were reached.
 
-    The step outside the box has one width, in the unit of T, on all sides, so goals also lie in directions in
-    which outcomes have not varied yet. The width follows a success rule (Rechenberg 1973), which aims at one hit among
-    four goals outside the box. A goal is met if its error is below its distance from the box, or below the median error
-    of goals in the box. All contexts share the box. If the inverse model reports movements without an effect, goals are
+    The step outside the box has one width on all sides, in the unit of T. So goals also lie in directions in which
+    outcomes have not varied yet. The width follows a success rule (Rechenberg 1973), by which one of four goals outside
+    the box is met. Such a goal is met if its error is below its distance from the box, or below the median error of
+    goals in the box. All contexts share the box. If the inverse model reports movements without an effect, goals are
     uniform in T, because a few effects do not show what can be reached.
 
     Args:
@@ -46,7 +46,7 @@ class WithinReach(UniformGoals):
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)
         self._reach: Array | None = None  # (2, outcome_dim), the box; None while all outcomes are equal
-        self._step, self._looked = _WIDEST, 0  # width of the step; number of exemplars at the last look
+        self._step, self._looked = _WIDEST, 0  # width of the step; number of exemplars when the box was computed
         self._missed = 0.0  # running median of the errors of goals in the box
         self._all_of_t = False  # whether T is hardly larger than the box with its widest step
 

@@ -1,8 +1,7 @@
 """Local process fitted to effective movements alone, for robots most of whose movements have no effect.
 
-Our addition, not in the paper. If a movement touches an object, the outcome changes smoothly with the movement;
-otherwise the outcome stays the same. One process for both kinds would predict both badly, and most exemplars would
-carry no information.
+Our addition, not in the paper. If a movement touches an object, its outcome changes smoothly with theta; otherwise the
+outcome does not depend on theta. One process for both kinds of movements would predict both badly.
     inverse = AmongEffects(problem); estimate = inverse(context, goal)
 """
 
@@ -18,7 +17,7 @@ from sgimd_torch.spaces import Array, Estimate
 class AmongEffects(Inverse):
     """Local Gaussian process; if most movements have no effect, it is fitted to effective movements alone.
 
-    It equals `LocalProcess` while every movement has an effect, or while no movement has had an effect yet.
+    While all movements or no movements have an effect, this inverse model equals `LocalProcess`.
 
     Args:
         problem: problem to learn.

@@ -1,7 +1,7 @@
 """Local inverse model L^-1: mean of similar movements whose outcomes are near the goal.
 
 Section 4.4.2 and eqs. (8) and (9) of Nguyen & Oudeyer (2014). Different movements can reach the same place, but their
-mean may land elsewhere. So the mean is over one neighbourhood of Pi only, which is near the goal *and* reliable.
+mean may land elsewhere. So the mean is over one neighbourhood in Pi, whose outcomes are near the goal and vary little.
     inverse = LocalInverse(problem); estimate = inverse(context, goal); estimate.theta
 """
 
@@ -20,11 +20,10 @@ class LocalInverse(Inverse):
 
     Args:
         problem: problem to learn.
-        h_max: number of nearest outcomes that are compared, eq. (8).
+        h_max: number of exemplars, those nearest to the goal, whose neighbourhoods are compared, eq. (8).
         k_max: largest number of exemplars in a neighbourhood.
-        dist_n: radius of a neighbourhood in Pi, the paper's distN; None: 0.6 for 25 dimensions of Pi; otherwise it
-            is proportional to the square root of the number of dimensions.
-        alpha: weight of the spread of a neighbourhood's outcomes, against their distance from the goal.
+        dist_n: radius of a neighbourhood in Pi, the paper's distN; None: 0.6 sqrt(theta_dim / 25).
+        alpha: weight of the standard deviation of outcomes in a neighbourhood; their distance to the goal has weight 1.
         width: width of the Gaussian of eq. (9), relative to the mean distance of the neighbourhood's outcomes from the
             goal. A wide Gaussian averages the neighbourhood; a narrow one follows the exemplar nearest to the goal.
 
@@ -58,7 +57,7 @@ class LocalInverse(Inverse):
         rows = self._most_reliable(context, goal)
         thetas, outcomes = self.memory.thetas[rows], self.memory.outcomes[rows]
         theta = gaussian_weights(goal, outcomes, self.width) @ thetas  # eq. (9)
-        # A mean lies between the values that it averages; rounding must not put it 1e-16 outside Pi.
+        # A mean lies between the values that it averages; clipping keeps rounding from moving it out of Pi.
         return Estimate(np.clip(theta, thetas.min(axis=0), thetas.max(axis=0)), thetas, outcomes, context)
 
     def _most_reliable(self, context: Array, goal: Array) -> Rows:
@@ -72,7 +71,7 @@ class LocalInverse(Inverse):
 def gaussian_weights(goal: Array, outcomes: Array, width: float) -> Array:
     """Weights beta of eq. (9): ``(k,)`` with sum 1, a Gaussian of the distances between ``outcomes`` and ``goal``.
 
-    The paper does not give the width of the Gaussian. Here it is ``width`` times the mean distance.
+    The paper does not give the standard deviation of the Gaussian. Here it is ``width`` times the mean distance.
     """
     distances = distances_to(outcomes, goal)
     scaled = distances / max(np.finfo(float).tiny, width * distances.mean())
@@ -83,9 +82,9 @@ def gaussian_weights(goal: Array, outcomes: Array, width: float) -> Array:
 def _spreads(outcomes: Array, neighbourhoods: list[Rows]) -> Array:
     """Standard deviations ``(h,)`` of the outcomes within each neighbourhood.
 
-    Deviation: the paper takes the variance, which is no distance, and too small to matter beside a distance. A
-    movement without neighbours has no deviation and gets the median of the other deviations. If no movement has
-    neighbours, all deviations are 0, and the movement nearest to the goal is chosen.
+    Deviation: the paper takes the variance, which is too small to matter when it is added to a distance. A
+    neighbourhood of one exemplar has no standard deviation and gets the median of the others. If all neighbourhoods
+    have one exemplar, all get 0, and the exemplar nearest to the goal is chosen.
     """
     spreads = np.array([_standard_deviation(outcomes[rows]) for rows in neighbourhoods])
     known = ~np.isnan(spreads)

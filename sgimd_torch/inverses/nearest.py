@@ -13,11 +13,11 @@ from sgimd_torch.spaces import Array, Estimate, check_count
 
 
 class NearestNeighbour(Inverse):
-    """Movement whose outcome came nearest to the goal.
+    """Remembered movement whose outcome is nearest to the goal.
 
     Args:
         problem: problem to learn.
-        k: number of exemplars that the estimate hands to a search, at least 1.
+        k: number of exemplars in the estimate, at which a search may begin, at least 1.
 
     Raises:
         ValueError: ``k`` is not a whole number, or below 1.

@@ -1,7 +1,7 @@
 """Memory: all exemplars (c, theta, tau) of a learner, and the nearest neighbours among them.
 
-Sections 3.2 and 4.4 of Nguyen & Oudeyer (2014): the set M. The outcome side finds movements that landed near a point (H
-of eq. 8), the policy side finds movements similar to a given one (K_h of eq. 8).
+Sections 3.2 and 4.4 of Nguyen & Oudeyer (2014): the set M. `near_outcomes` finds movements that landed near a point (H
+of eq. 8), and `near_policies` finds movements similar to a given movement (K_h of eq. 8).
     memory.add(context, theta, outcome); rows = memory.near_outcomes(context, goal, k=10); memory.thetas[rows]
 """
 
@@ -23,7 +23,7 @@ _NO_CONTEXT: Final = "an environment without contexts gives np.zeros(0)"
 class Memory:
     """Exemplars in the order in which they were added; the row number of an exemplar never changes.
 
-    In distances, a unit of context counts as much as a unit of outcome or theta.
+    In distances, one unit of context counts as much as one unit of outcome or theta.
 
     Args:
         context_dim: dimension of C; 0 if there are no contexts, as in the fishing task.
@@ -41,7 +41,7 @@ class Memory:
             )
         self.context_dim, self.theta_dim, self.outcome_dim = context_dim, theta_dim, outcome_dim
         self._contexts, self._thetas, self._outcomes = Table(context_dim), Table(theta_dim), Table(outcome_dim)
-        # A key is a context with an outcome or a theta; without contexts, the tables themselves hold the keys.
+        # A key is a context followed by an outcome or by a theta; without contexts, outcomes and thetas are the keys.
         self._outcome_side = TreeNeighbours(Table(context_dim + outcome_dim) if context_dim else self._outcomes)
         self._policy_side = PolicyNeighbours(Table(context_dim + theta_dim) if context_dim else self._thetas)
         self._range, self._ranged = (np.full(theta_dim, np.inf), np.full(theta_dim, -np.inf)), 0
@@ -51,7 +51,7 @@ class Memory:
 
     @property
     def contexts(self) -> Array:
-        """``(n, context_dim)`` read-only; exemplars that are added later do not appear in it."""
+        """``(n, context_dim)`` read-only; exemplars that are added later do not appear in this array."""
         return self._contexts.rows
 
     @property
@@ -88,20 +88,21 @@ class Memory:
         self._append(context[None], theta[None], outcome[None])
 
     def near_outcomes(self, context: ArrayLike, goal: ArrayLike, k: int) -> Rows:
-        """Rows ``(min(k, n),)`` whose outcomes lie nearest to ``goal`` ``(outcome_dim,)``, nearest first; of
-        equally near rows, the oldest first."""
+        """Rows ``(min(k, n),)`` whose contexts and outcomes lie nearest to ``context`` and ``goal`` ``(outcome_dim,)``,
+        nearest first; of equally near rows, the oldest first."""
         goal = check_point("goal", goal, self.outcome_dim, "was a theta passed instead?")
         return self._outcome_side.nearest(self._key(context, goal), k)
 
     def nearest(self, context: ArrayLike, goal: ArrayLike) -> Nearest:
-        """The first row of :meth:`near_outcomes`, as an object that follows the memory as it grows."""
+        """The first row of :meth:`near_outcomes`, as an object that stays up to date while the memory grows."""
         goal = check_point("goal", goal, self.outcome_dim, "was a theta passed instead?")
         return Nearest(self._outcome_side, self._key(context, goal))
 
     def near_policies(self, context: ArrayLike, theta: ArrayLike, k: int, within: float = np.inf) -> Rows:
-        """At most ``k`` rows whose thetas lie nearest to ``theta`` ``(theta_dim,)``, not farther than ``within``.
+        """At most ``k`` rows whose contexts and thetas lie nearest to ``context`` and ``theta`` ``(theta_dim,)``, not
+        farther than ``within``.
 
-        The result is exact for up to ``EXACT_UP_TO`` exemplars, see `PolicyNeighbours`; with more, rows may be missing.
+        With more than ``EXACT_UP_TO`` exemplars in memory some of these rows may be missing, see `PolicyNeighbours`.
         """
         theta = check_point("theta", theta, self.theta_dim, "was a goal passed instead?")
         return self._policy_side.nearest(self._key(context, theta)[None], k, within)[0]
@@ -140,7 +141,7 @@ class Memory:
 
 
 class Nearest:
-    """The row whose outcome lies nearest to one goal in one context; each look compares the newest exemplars only."""
+    """The row whose outcome lies nearest to one goal in one context; later looks compare only newer exemplars."""
 
     def __init__(self, side: TreeNeighbours, key: Array) -> None:
         self._side, self._key = side, key

@@ -1,19 +1,19 @@
-"""The record of a learner's life: one SQLite file of all events. Reading it detects every later change to the file.
+"""The record of a learner's life: one SQLite file with all events. Reading the file detects every change by others.
 
     with Record.make(path, dims, settings) as record: record.add(event); record.commit()  # one writer
     with Record(path) as record: list(record.events()); record.rows("evaluations")  # any number of readers
 
 Tables (``docs/runs.md`` explains each column):
-    about            settings, versions and seconds of the run, as json
-    events           moved, rested, shown, asked, failed, interrupted, in order
+    about            settings, versions and run times, as json
+    events           everything that happened, in order: moved, rested, shown, asked, failed, interrupted
     demonstrations   each demonstration that was shown, once
     goals            goals of evaluation
     evaluations, errors, regions     rows of each evaluation
     predictions, refreshes           rows of a forward model
-    seals            the number of rows of each table, and the seal of its last row
+    seals            number of rows of each table, and seal of its last row
 
-Every row ends in a seal: a checksum of the row, of all rows before it, of its table and of the run. So reading raises
-an error if a row was changed, lost, doubled, moved or taken from another run.
+Every row ends in a seal: a checksum of the row, of all earlier rows, of the table and of the run. So reading raises an
+error if a row was changed, lost, doubled, moved or taken from another run.
 """
 
 from __future__ import annotations
@@ -57,11 +57,11 @@ class Record:
     """An existing record, open for reading and, on request, for writing; a context manager.
 
     Args:
-        path: the file.
-        write: whether to open it for writing, too. Until this record is closed, other processes can only read it.
+        path: SQLite file.
+        write: whether to open the file for writing, too. Other processes can then only read it, until ``close``.
 
     Attributes:
-        about: settings, versions and so on, by name; see ``settle``.
+        about: settings, versions and other facts about the run, by name; see ``settle``.
         dims: dimensions of context, theta and outcome.
 
     Raises:
@@ -86,7 +86,7 @@ class Record:
 
     @classmethod
     def make(cls, path: str | os.PathLike[str], dims: Dims, about: Mapping[str, Any]) -> Self:
-        """A new record, open for writing; ``about`` holds values that json can express.
+        """A new record, open for writing; ``about`` has facts about the run that json can express.
 
         Raises:
             OSError: the file cannot be written.
@@ -125,10 +125,10 @@ class Record:
         """The rows of a table, in order, without their seals.
 
         Raises:
-            RunError: a row was changed, or rows are missing or added; the rows before the error were yielded.
+            RunError: a row was changed, or rows are missing or added; all rows before it have been yielded.
         """
         n, seal, last = 0, self._first_seal(table), -(2**63)
-        # No cursor stays open between yields: it would keep a lock on the file, even after an error.
+        # No cursor stays open between yields, because an open cursor locks the file, even after an error.
         next_rows = f"SELECT rowid, * FROM {table} WHERE rowid > ? ORDER BY rowid LIMIT {_AT_ONCE}"
         with self._told():
             while rows := self._connection.execute(next_rows, (last,)).fetchall():
@@ -155,13 +155,13 @@ class Record:
         return [read_demonstration(row, self.dims) for row in self.rows("demonstrations")]
 
     def add(self, event: Event) -> None:
-        """Append an event; ``commit`` brings it to the disk."""
+        """Append an event; it is on the disk after ``commit``."""
         lesson = None if event.lesson is None else self._demonstration(event.lesson)
         self._append("events", [event_row(event, self._movements, lesson, self.dims)])
         self._movements = movements_after(self._movements, event.kind)
 
     def add_rows(self, table: str, rows: Iterable[Sequence[Any]]) -> None:
-        """Append rows to one of the ``DERIVED`` tables; NaN becomes NULL."""
+        """Append rows to one of the ``DERIVED`` tables; NaN is stored as NULL."""
         self._append(table, [plain(row) for row in rows])
 
     def replace_rows(self, table: str, rows: Iterable[Sequence[Any]]) -> None:
@@ -190,7 +190,7 @@ class Record:
             self._lock()
 
     def check(self) -> dict[str, str]:
-        """A sentence on each damaged table, by name of the table; {} if no table is damaged."""
+        """Error messages about damaged tables, by name of the table; {} if no table is damaged."""
         wrong = {}
         for table in layout(self.dims):
             try:
@@ -201,10 +201,10 @@ class Record:
         return wrong
 
     def rewrite(self) -> Record:
-        """Replace the file by one with the events before the first damaged row, and close this record.
+        """Replace the file by a new one with all events before the first damaged row, and close this record.
 
         Returns:
-            The new record, open for writing, with empty ``DERIVED`` tables, which a replay fills again.
+            The new record, open for writing. Its ``DERIVED`` tables are empty until a replay fills them again.
 
         Raises:
             OSError: the file cannot be written.
@@ -216,7 +216,7 @@ class Record:
                 with suppress(RunError):
                     for row in self.rows("demonstrations"):
                         shown.append(read_demonstration(row, self.dims))
-                with suppress(RunError, IndexError):  # an event may refer to a demonstration that is lost
+                with suppress(RunError, IndexError):  # IndexError: an event refers to a lost demonstration
                     for event in map(event_reader(self.dims, shown), self.rows("events")):
                         new.add(event)
                 new.commit()
@@ -224,7 +224,7 @@ class Record:
         return Record(self.path, write=True)
 
     def _demonstration(self, shown: Demonstration) -> int:
-        """The row number of a demonstration; if the demonstration is new, it is appended."""
+        """The row number of a demonstration; a new demonstration is appended first."""
         row = demonstration_row(shown, self.dims)
         if not self._shown:
             self._shown = {_row_bytes(each): k for k, each in enumerate(self.rows("demonstrations"))}
@@ -259,7 +259,7 @@ class Record:
         self._movements = 0 if last is None else movements_after(*last)
 
     def _lock(self) -> None:
-        """Lock out other writers until this record is closed; readers may enter."""
+        """Lock the file against other writers until this record is closed; readers are still admitted."""
         before = self._version
         self._connection.execute("BEGIN IMMEDIATE")
         self._version = self._connection.execute("PRAGMA data_version").fetchone()
@@ -269,7 +269,7 @@ class Record:
 
     @contextmanager
     def _told(self, *, writing: bool = False) -> Iterator[None]:
-        """Turn errors of SQLite or from unexpected values in the file into RunError or OSError, with the path."""
+        """Turn errors of SQLite, and errors from unexpected values, into RunError or OSError with the path."""
         if self._lost is not None:
             raise self._lost
         said: Exception
@@ -284,21 +284,21 @@ class Record:
                 said = OSError(f"{self.path} cannot be written: {error}")
             else:
                 said = RunError(f"{self.path} cannot be read as a record: {error}; {HINT}")
-            if writing:  # no row may follow the missing ones
+            if writing:  # the next rows would follow a gap
                 self._lost = said
                 self._connection.close()
             raise said from error
 
 
 def _connect(path: Path, write: bool) -> sqlite3.Connection:
-    # No code here may open the file: closing it would release all locks that this process has on the file.
+    # Never open the file here in another way: closing it would release all locks that this process has on the file.
     if not path.is_file():
         raise RunError(f"there is no record {path}")
     if not path.stat().st_size:
         raise RunError(f"{path} is still empty")
     try:
-        # Readers need mode=rw, too, to clean up after a killed writer. SQLite opens a read-only file for reading alone.
-        # If a run is taught by hand, one thread opens the record and another uses it later, never both at a time.
+        # Readers need mode=rw, too, to clean up after a killed writer. SQLite still opens a read-only file for reading.
+        # check_same_thread=False: teaching by hand opens the record in one thread and later uses it in another.
         place, patience = f"{path.resolve().as_uri()}?mode=rw", 0.5 if write else 10.0
         return sqlite3.connect(place, uri=True, isolation_level=None, timeout=patience, check_same_thread=False)
     except (sqlite3.Error, OSError) as error:
@@ -316,12 +316,12 @@ def _about_rows(about: Mapping[str, Any]) -> list[Row]:
 
 
 def _root(run: str, table: str) -> int:
-    """The seal before the first row of a table."""
+    """The seal with which the checksums of a table begin, before its first row."""
     return zlib.crc32(f"{run} {table}".encode())
 
 
 def _row_bytes(row: Sequence[Any]) -> bytes:
-    """A row as bytes, for its seal. Binary floats take a fifth of the time that text would take."""
+    """A row as bytes, for its seal. Binary floats take a fifth of the time of text."""
     return marshal.dumps(tuple(row), 2)
 
 

@@ -1,4 +1,4 @@
-"""The layout of a record: columns of every table, and rows of events and demonstrations."""
+"""The layout of a record: the columns of every table, and rows as Python objects."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from sgimd_torch.spaces import Array, Demonstration
 
 DERIVED: Final = ("goals", "evaluations", "errors", "regions", "predictions", "refreshes")  # tables that a replay fills
 SEALS: Final = ["name TEXT", "n_rows INTEGER", "seal INTEGER"]  # columns of the table ``seals``
-HINT: Final = "was it damaged or edited?"
+HINT: Final = "was it damaged or edited?"  # last part of error messages
 
 Dims = tuple[int, int, int]
 """Dimensions of context, theta and outcome."""
@@ -25,12 +25,12 @@ class RunError(ValueError):
     """A record cannot be used: it is missing, damaged, in use, or belongs to another run."""
 
 
-_COUNTED: Final = (Kind.MOVED, Kind.RESTED, Kind.FAILED)
-_IN_CONTEXT: Final = (*_COUNTED, Kind.ASKED, Kind.INTERRUPTED)
+_COUNTED: Final = (Kind.MOVED, Kind.RESTED, Kind.FAILED)  # events that count as movements
+_IN_CONTEXT: Final = (*_COUNTED, Kind.ASKED, Kind.INTERRUPTED)  # events with a context
 
 
 def layout(dims: Dims) -> dict[str, list[str]]:
-    """The columns of every table, as SQL declares them. SQLite allows at most 2,000 columns in a table."""
+    """Declarations of the columns of every table, in SQL. SQLite allows at most 2,000 columns in a table."""
     c, p, t = dims
     context, theta, goal, outcome = (
         _vector(name, dim) for name, dim in (("context", c), ("theta", p), ("goal", t), ("outcome", t))
@@ -57,7 +57,7 @@ def layout(dims: Dims) -> dict[str, list[str]]:
 
 
 def event_row(event: Event, movement: int, lesson: int | None, dims: Dims) -> Row:
-    """The row of an event after ``movement`` movements; ``lesson`` is the row number of its demonstration."""
+    """The row of an event after ``movement`` movements; ``lesson`` is the row number of the event's demonstration."""
     c, p, t = dims
     vectors = (
         *_cells(event.context, c),
@@ -69,7 +69,7 @@ def event_row(event: Event, movement: int, lesson: int | None, dims: Dims) -> Ro
 
 
 def event_reader(dims: Dims, shown: Sequence[Demonstration]) -> Callable[[Row], Event]:
-    """A function that turns a row of ``events`` into an event; ``shown`` has the demonstrations by row number."""
+    """A function that turns a row of ``events`` into an event; ``shown`` is the content of ``demonstrations``."""
     every = (*dims, dims[2])
     parts = [slice(*ends) for ends in pairwise(accumulate(every, initial=3))]
 
@@ -86,7 +86,7 @@ def event_reader(dims: Dims, shown: Sequence[Demonstration]) -> Callable[[Row], 
 
 
 def movements_after(movement: int, kind: str) -> int:
-    """Number of movements after an event of this kind, rests included."""
+    """Number of movements after an event of this ``kind``; ``movement`` is the number before it. Rests count, too."""
     return movement + (kind in _COUNTED)
 
 
@@ -111,13 +111,13 @@ def _vector(name: str, dim: int) -> list[str]:
 
 
 def _cells(values: Array | None, dim: int) -> list[Any]:
-    """The cells of a vector; all are NULL if it is None or has a NaN. -0.0 becomes 0.0, as in SQLite."""
+    """The cells of a vector, all NULL if the vector is None or has a NaN. -0.0 becomes 0.0, as in SQLite."""
     numbers = None if values is None else np.asarray(values, dtype=np.float64) + 0.0
     return [None] * dim if numbers is None or np.isnan(numbers).any() else numbers.tolist()
 
 
 def _array(cells: Row) -> Array | None:
-    """The vector in these cells, None if a cell is NULL."""
+    """The vector in some cells of a row, None if one of the cells is NULL."""
     return None if None in cells else np.array(cells, dtype=np.float64)
 
 

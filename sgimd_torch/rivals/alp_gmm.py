@@ -2,7 +2,7 @@
 
 Portelas, Colas, Hofmann & Oudeyer, Teacher algorithms for curriculum learning of deep RL in continuously parameterized
 environments (CoRL 2019). Progress at a goal is |competence - competence at the nearest earlier goal|. A mixture of
-Gaussians over (context, goal, progress) is fitted from time to time, and shows where progress is high. Needs
+Gaussians over (context, goal, progress) is fitted every 50 goals, and shows where progress is high. This module needs
 scikit-learn.    goals = AlpGmm(problem)
 """
 
@@ -24,10 +24,10 @@ except ImportError as error:
     raise ImportError(f"ALP-GMM needs scikit-learn: pip install 'sgimd-torch[rivals]' ({error})") from error
 
 _DRAWS = 20  # number of draws from a Gaussian; the first that lies in T is the goal
-# Goals between two fits; before the first fit, goals are uniform. Deviation: the publication waits for 250 goals, which
-# are half of the goals of a run on the rod.
+# Number of goals between two fits; before the first fit, goals are uniform. Deviation: 250 in the publication, which is
+# half of the goals of a run on the rod.
 _REFIT = 50
-_COMPONENTS = 10  # largest number of Gaussians; Akaike's criterion chooses the number, at least 2
+_COMPONENTS = 10  # largest number of Gaussians; Akaike's criterion chooses a number from 2 on
 
 
 class AlpGmm(Goals):
@@ -35,12 +35,13 @@ class AlpGmm(Goals):
 
     Without contexts a Gaussian is chosen in proportion to its mean progress, and a goal is drawn from it. With
     contexts, the mean progress is multiplied by the density at the context, and the goal is drawn from the Gaussian
-    given this context. A goal outside T is drawn again, and clipped after 20 draws. The sides of C x T are the units.
+    given this context. A goal outside T is drawn again, and clipped after 20 draws. All distances are relative to the
+    sides of C x T.
 
     Args:
         problem: problem to learn.
-        memory: number of last goals to which the mixture is fitted; progress at a goal uses all earlier goals.
-        uniform: probability of a goal anywhere in T.
+        memory: number of last goals to which the mixture is fitted.
+        uniform: probability of a goal that is uniform in T.
 
     Raises:
         ValueError: a number is out of its range.
@@ -83,8 +84,8 @@ class AlpGmm(Goals):
     def add(
         self, context: ArrayLike, goal: ArrayLike, competence: float, strategy: str = "autonomous", gain: float = 0.0
     ) -> None:
-        """Learn the competence at a goal; progress is the change from the competence at the nearest earlier goal. If
-        several goals are equally near, the latest counts.
+        """Learn the competence at a goal, and its progress since the nearest earlier goal; of equally near goals the
+        latest counts.
 
         Raises:
             ValueError: see `Goals.add`.
@@ -103,14 +104,14 @@ class AlpGmm(Goals):
         rows = np.column_stack((self._points, self._progress))[-self.memory :]
         seed = int(self.rng.integers(2**32))
         with warnings.catch_warnings():
-            # Akaike's criterion also works for coincident goals, or a mixture that has not quite converged.
+            # Akaike's criterion also compares mixtures that have not converged, for example because goals coincide.
             warnings.simplefilter("ignore", ConvergenceWarning)
             numbers = range(2, _COMPONENTS + 1)
             mixtures = [GaussianMixture(number, random_state=seed).fit(rows) for number in numbers]
         return min(mixtures, key=lambda mixture: mixture.aic(rows))
 
     def _draw(self, mixture: GaussianMixture, context: Array) -> Array:
-        """A goal from one of the Gaussians, given the context, relative to the sides of C."""
+        """A goal from one of the Gaussians, given the ``context`` relative to the sides of C."""
         c, g = slice(self.contexts.dim), slice(self.contexts.dim, -1)
         means, covariances = mixture.means_, mixture.covariances_
         away = context - means[:, c]  # (components, context_dim)

@@ -24,15 +24,15 @@ except ImportError as error:
 class CmaEs(Search):
     """Evolution strategy CMA-ES on the distance to the goal.
 
-    Each goal starts a new strategy around theta_g, which is executed first. Other exemplars of the estimate are not
-    used, because the distribution of CMA-ES cannot include them. All draws come from ``rng``.
+    Each goal starts a new evolution strategy around theta_g, which is executed first. The exemplars of the estimate are
+    not used, because CMA-ES begins with a Gaussian, not with given movements. All draws come from ``rng``.
 
     Args:
         problem: problem to learn.
         sd: standard deviation of the first generation, as a fraction of each parameter's range in Pi.
-        population: number of movements in a generation, at least 3; None: number of the package, 4 + 3 ln(theta_dim).
-            Deviation: the package's number is 13 for the rod, so the first generation would use up nearly all of a
-            goal's 15 movements. With 4 (two mirrored pairs) there are three generations.
+        population: number of movements in a generation, at least 3; None: default of the package, 4 + 3 ln(theta_dim).
+            Deviation: the package's default is 13 for the rod, so the first generation would use nearly all of a goal's
+            15 movements. With 4 there are three generations.
 
     Raises:
         ValueError: a number is out of its range, or Pi has one dimension.
@@ -61,7 +61,7 @@ class CmaEs(Search):
         policies = self.problem.policies
         theta = policies.check("theta of the estimate", start.theta)
         yield theta
-        # CMA-ES works relative to the sides of Pi, so that the units of Pi do not matter.
+        # CMA-ES gets movements relative to the sides of Pi, so that the units of Pi do not matter.
         centre = np.clip((theta - policies.low) / policies.sides, 0, 1)
         strategy = CMAEvolutionStrategy(centre, self.sd, self._options)
         while not strategy.stop():

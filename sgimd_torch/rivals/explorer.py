@@ -1,4 +1,4 @@
-"""Quality diversity as strategies: movements of a scheduler, batch after batch, and imitation of demonstrations.
+"""Strategies of quality diversity: movements that a scheduler proposes in batches, and imitation of demonstrations.
 
 explorer = QualityDiversity(problem, Scheduler(archive, emitters), "map-elites"); Learner(problem, explorer)
 """
@@ -18,20 +18,19 @@ if TYPE_CHECKING:
 
 
 class QualityDiversity(Strategy):
-    """Movements of a scheduler, batch after batch; when all of a batch was executed, the scheduler is told.
+    """Movements that a scheduler proposes in batches; after each batch, the scheduler is told the outcomes.
 
-    The objective decides between elites of one cell and prefers little effort: it is minus the mean square distance of
-    a movement from the middle of Pi, in sides of Pi. Outcomes outside T count for the nearest border cell of T. If T is
-    far larger than the reachable part, nearly all outcomes share a few cells, and few elites are left to vary.
+    A cell keeps the movement with the largest objective, its elite. The objective is minus the mean square distance of
+    a movement from the middle of Pi, relative to the sides of Pi. An outcome outside T counts in the nearest border
+    cell of T. If T is far larger than the reachable part, most outcomes fall into a few cells, so there are few elites.
 
-    Each attempt is one movement. If it is interrupted before its outcome is told, the movement is proposed again.
+    Each attempt is one movement. If an attempt is interrupted before its outcome, the next attempt repeats it.
 
     Args:
         problem: problem to learn; exemplars of its memory are in the archive from the start.
         scheduler: scheduler of ribs, with an archive over T; its movements are relative to the sides of Pi. Deviation:
-            a movement outside Pi is clipped for execution, but the scheduler is told the effort of the proposed
-            movement. CMA-ES itself would draw again, which never ends once its mean lies in a corner of many
-            dimensions.
+            a movement outside Pi is clipped for execution, but the scheduler is told the objective of the proposed
+            movement. CMA-ES would draw such a movement again, and in many dimensions these draws may never end.
         origin: origin of the movements, for the record.
     """
 
@@ -68,7 +67,7 @@ class QualityDiversity(Strategy):
 
 
 class Shown(Social):
-    """Imitate a demonstration, as SGIM-D does; executed movements enter the archive, where they are varied."""
+    """Imitate a demonstration as in SGIM-D; the executed movements enter the archive, so that they are varied later."""
 
     def __init__(self, problem: Problem, explorer: QualityDiversity, mimic: Mimic) -> None:
         super().__init__(problem)

@@ -1,8 +1,8 @@
 """Quality diversity: learners that fill an archive over T with movements for its cells.
 
 MAP-Elites (Mouret & Clune 2015), its line operator (Vassiliades & Mouret 2018), CMA-ME (Fontaine et al. 2020) and
-CMA-MAE (Fontaine & Nikolaidis 2023), by the package ``ribs``. Like goal babbling they find a movement for every
-outcome that they reach. But they have no goals: they vary movements that had new outcomes.
+CMA-MAE (Fontaine & Nikolaidis 2023), by the package ``ribs``. Like goal babbling, these learners find a movement for
+each part of T that they reach. But they have no goals: they vary movements that had new outcomes.
     learner = map_elites(environment, seed)        learner = cma_mae(environment, seed, correspondence=translate)
 """
 
@@ -32,8 +32,8 @@ try:
 except ImportError as error:
     raise ImportError(f"quality diversity needs ribs: pip install 'sgimd-torch[rivals]' ({error})") from error
 
-_DEFAULT_CELLS = 400  # 20 x 20 cells of .1 m in the fishing task, like the tiles of its benchmark
-_MAX_CELLS = 1_000_000  # limit, because ribs keeps an array of all cells
+_DEFAULT_CELLS = 400  # number of cells: 20 x 20 cells of .1 m in the fishing task, like the tiles of its benchmark
+_MAX_CELLS = 1_000_000  # largest number of cells; ribs keeps an array of all cells
 _LEAST_OBJECTIVE = -0.35  # first threshold of CMA-MAE's cells: below the objective of the corners of Pi, -.25
 _SHARED = ("cells", "correspondence", "imitations", "epsilon", "inverse", "memory")
 MakeEmitters = Callable[[GridArchive, np.random.Generator], Sequence[EmitterBase]]
@@ -58,7 +58,7 @@ def quality_diversity(
     Args:
         environment: robot and world; nothing is executed here.
         seed: number from which the random stream of the learner comes.
-        origin: name of this stream, and origin of the movements in the record.
+        origin: name of the random stream, and origin of the movements in the record.
         emitters: function (archive, rng) -> emitters, which propose movements.
         annealed: keywords of the archive of CMA-MAE.
         cells: number of cells in each dimension of T; None: about 400 cells in all.
@@ -103,7 +103,7 @@ def map_elites(
     batch: int = 10,
     **options: Any,
 ) -> Learner:
-    """MAP-Elites with a teacher: Gaussian variations of elites, drawn evenly from the reached cells of T.
+    """MAP-Elites with a teacher: Gaussian variations of elites; all reached cells of T are equally likely.
 
     Args:
         environment: robot and world; nothing is executed here.
@@ -170,7 +170,7 @@ def cma_me(
     Args:
         environment, seed, options: arguments of `map_elites`.
         emitters: number of improvement emitters, which start at the centre of Pi. Deviation: Fontaine et al. have 15,
-            of which each would get only about 25 generations in a run on the rod.
+            but in a run on the rod each of the 15 would get only about 25 generations.
         sd: standard deviation at the start and after a restart, as a fraction of each parameter's range in Pi.
             Deviation: pyribs' examples start wider, but in many dimensions a wide start leads into the corners of Pi.
         batch: number of movements in a generation of each emitter, at least 2; None: 4 + 3 ln(theta_dim).
@@ -193,7 +193,7 @@ def cma_mae(
     learning_rate: float = 0.01,
     **options: Any,
 ) -> Learner:
-    """CMA-MAE with a teacher: CMA-ME with thresholds that rise slowly, so that cells stay worth improving.
+    """CMA-MAE with a teacher: CMA-ME with thresholds that rise slowly, so that more movements are improvements.
 
     Args:
         environment, seed, emitters, sd, batch, options: arguments of `cma_me`.

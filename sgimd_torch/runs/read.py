@@ -1,4 +1,4 @@
-"""Read the whole record of a run as arrays. Figures, reports and tables use nothing else.
+"""Read the record of a run as arrays. Figures, reports and tables get all their data from here.
 
 run = read_run("runs/sgim-d/seed-003"); run.outcomes, run.evaluation["mean_error"]    # docs/runs.md explains the tables
 """
@@ -28,27 +28,28 @@ Columns = dict[str, np.ndarray]
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """The record of a run so far: finished, stopped or running.
+    """A run as far as it is recorded: finished, stopped or still running. It has n movements, rests included.
 
     Attributes:
         path: directory of the run.
         config: options by name.
         versions, files, words: entries of the table ``about``, see docs/runs.md.
         robot: name of the environment's class.
-        spaces: "contexts", "policies" and "outcomes".
-        summary: number of "movements", number that "failed", whether it is "finished", seconds.
-        index: ``(n,)`` numbers of the movements.
-        origin: ``(n,)`` proposer of each movement, such as "local"; "" for a rest.
-        demonstration: ``(n,)`` row, in ``demonstrations``, of the demonstration just before each movement; -1: none.
-        contexts, thetas, goals, outcomes: ``(n, dim)``, NaN: none; a failed movement has a theta and no outcome.
-        answers: columns of the evaluations of each inverse model, by name.
+        spaces: boxes C, Pi and T, by the names "contexts", "policies" and "outcomes".
+        summary: numbers of "movements" and of "failed" movements, whether the run is "finished", and seconds by part.
+        index: ``(n,)`` numbers of the movements, from 0.
+        origin: ``(n,)`` origin of each movement, such as "local" or "imitate"; "" for a rest.
+        demonstration: ``(n,)`` indices in ``demonstrations`` of what was shown just before each movement; -1: nothing.
+        contexts, thetas, goals, outcomes: ``(n, dim)`` vectors of each movement; NaN stands for none.
+        answers: columns of the table ``evaluations``, by inverse model.
         errors: columns of the errors at all goals in all evaluations.
-        benchmark: ``(n_goals, outcome_dim)`` goals of evaluation.
+        benchmark: ``(n_goals, outcome_dim)`` benchmark goals.
         demonstrations: each demonstration that was shown, once.
         regions: columns of the goal model's regions at all evaluations, None for a goal model without regions.
         predictions, refreshes: columns of a forward model, None for a run without a forward model.
-        requests: columns of the requests to teachers (None: no requests): ``index`` of the next movement, ``teacher``,
-            ``strategy``, ``reply``, ``shown`` (row of the demonstration, -1 for none), ``wanted_0`` ... (in C x T).
+        requests: columns of the requests to teachers, None for a run without requests: ``index`` of the next movement,
+            ``teacher``, ``strategy``, ``reply``, ``shown`` (index in ``demonstrations``, -1 for none), and ``wanted_0``
+            and so on, the requested point in C x T.
     """
 
     path: Path
@@ -81,7 +82,7 @@ class Run:
         return self.answers[OWN]
 
     def at(self, movements: int, column: str = "mean_error", answer: str = OWN) -> float:
-        """One number of an evaluation, NaN if there is no such evaluation."""
+        """One number of the evaluation after ``movements`` movements, NaN if there is no such evaluation."""
         evaluation = self.answers.get(answer)
         if evaluation is None:
             return float("nan")
@@ -95,9 +96,9 @@ class Run:
         return self.errors["error"][now], np.array(contexts).T.reshape(int(now.sum()), -1)
 
     def chosen_goals(self) -> Array:
-        """``(n, outcome_dim)`` goals that the learner chose, in order; a goal of several movements is listed once.
+        """``(n, outcome_dim)`` goals that the learner chose, in order; a goal of successive movements is listed once.
 
-        Goals of imitation are left out, as the teacher chose them.
+        Goals of imitations are left out, as a teacher chose them.
         """
         own = self.goals[np.isfinite(self.goals).all(axis=1) & (self.origin != "imitate")]
         new = (np.diff(own, axis=0, prepend=np.nan) != 0).any(axis=1)
@@ -105,13 +106,13 @@ class Run:
 
 
 def read_run(path: str | os.PathLike[str]) -> Run:
-    """The record of a run so far.
+    """The run in a directory, as far as it is recorded.
 
     Args:
         path: directory of the run.
 
     Raises:
-        RunError: there is no run at ``path``, or it is damaged.
+        RunError: there is no run at ``path``, or its record is damaged.
     """
     path = Path(path)
     if not (path / FILE).exists():
@@ -129,7 +130,7 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         found: dict[str, Columns] = {table: _columns(record, table) for table in DERIVED}
         n = record.movements
     evaluated = found["evaluations"]["movements"]
-    nothing = not shown and not np.isfinite(arrays["outcomes"]).any()  # an empty memory, which cannot be evaluated
+    nothing = not shown and not np.isfinite(arrays["outcomes"]).any()  # the memory is empty, so there is no evaluation
     finished = n == settings["movements"] and (settings["evaluate_at"] == [] or n in evaluated or nothing)
     return Run(
         path=path,
@@ -157,7 +158,7 @@ def _if_any(columns: Columns) -> Columns | None:
 
 
 def _lived(record: Record) -> tuple[dict[str, Any], Columns | None, int]:
-    """Movements as arrays, requests (None: there were none), and the number of failed movements."""
+    """Movements as arrays by attribute of `Run`, requests as columns or None, and the number of failed movements."""
     c, p, t = record.dims
     origins, shown, cells, requests = list[str](), array("q"), array("d"), list[dict[str, Any]]()
     last, failed = -1, 0
@@ -193,14 +194,14 @@ _KINDS: Final = {"TEXT": np.str_, "INTEGER": np.int64, "REAL": np.float64}  # NU
 
 
 def config_of(run: Run, *, trust: bool = False) -> Config:
-    """The configuration of a run, to build its parts again.
+    """The settings of a run, from which its parts can be built again.
 
     Args:
         run: result of ``read_run``.
-        trust: whether to execute the user's code that the settings name, ``package.module:attribute``.
+        trust: whether to execute the user's code that the settings name as ``package.module:attribute``.
 
     Raises:
-        RunError: the settings name such code without ``trust``, or do not describe a run of this version.
+        RunError: the settings name code of the user and ``trust`` is false, or are those of another version.
     """
     code = [] if trust else code_of(run.config)
     if code:
@@ -214,7 +215,7 @@ def config_of(run: Run, *, trust: bool = False) -> Config:
 
 
 def find_runs(place: str | os.PathLike[str]) -> dict[str, list[Path]]:
-    """Run directories by name of the variant, in the order of their seeds.
+    """Run directories of each variant, by name of the variant, in the order of their seeds.
 
     Args:
         place: directory of a run, folder of a variant, or folder of variants.
@@ -233,7 +234,7 @@ def find_runs(place: str | os.PathLike[str]) -> dict[str, list[Path]]:
 
 
 def finished(config: Config) -> bool:
-    """Whether this run is on disk, undamaged, with these options, and complete with its last evaluation."""
+    """Whether an undamaged run with these settings is on disk, complete with its last evaluation."""
     try:
         run = read_run(config.directory)
         found, wanted = run.config, config.settings
@@ -241,7 +242,7 @@ def finished(config: Config) -> bool:
         return bool(run.summary["finished"] and same) and all(
             config[name] is None or run.files.get(f"{name}_crc32") in (None, checksum(config[name])) for name in FILES
         )
-    except (ValueError, OSError):  # a run of another version or unreadable; --resume gives the reason
+    except (ValueError, OSError):  # another version, or unreadable; --resume will give the reason
         return False
 
 
@@ -255,7 +256,7 @@ def movements_on_disk(path: Path) -> int:
 
 
 def _by_answer(columns: Columns) -> dict[str, Columns]:
-    """The evaluations of each inverse model, by name; the run's own inverse model is always among them."""
+    """The evaluations of each inverse model, by its name; the run's own inverse model is always there, as ``OWN``."""
     words = columns["answer"]
     return {
         word: {name: values[words == word] for name, values in columns.items() if name != "answer"}

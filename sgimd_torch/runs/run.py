@@ -219,9 +219,9 @@ class Life:
 
 
 class Listener(Protocol):
-    """Listener of a run. A resumed run first tells its listeners everything that is in the record.
+    """Listener of a run; it overrides the methods that it needs.
 
-    A listener overrides the methods that it needs.
+    A resumed run first tells its listeners everything that is in the record.
     """
 
     def episode(self, episode: Episode, replayed: bool) -> None:
@@ -229,19 +229,19 @@ class Listener(Protocol):
         return
 
     def evaluated(self, movements: int, found: Mapping[str, Evaluation]) -> None:
-        """The learner was evaluated after this number of movements; ``found`` is by name of the inverse model."""
+        """The learner was evaluated after ``movements`` movements; ``found`` is by name of the inverse model."""
         return
 
     def begin(self) -> None:
-        """The replay is over: from now on files may change."""
+        """The replay of the record is over; before this call, a listener must not change files."""
         return
 
     def curves(self) -> Mapping[str, float]:
-        """Numbers for the board since the last call, by tag."""
+        """New numbers for the board since the last call, by tag."""
         return {}
 
     def flush(self) -> None:
-        """Write everything so far to the disk."""
+        """Write everything to the disk that is still in memory."""
         return
 
     def close(self) -> None:
@@ -250,7 +250,11 @@ class Listener(Protocol):
 
 
 class Seconds:
-    """Seconds spent so far, by part of the run. Physics and evaluation, which are not replayed, begin at ``before``."""
+    """Seconds spent so far, by part of the run.
+
+    Args:
+        before: seconds of the resumed run; physics and evaluation continue from there, as a replay skips both.
+    """
 
     def __init__(self, before: Mapping[str, float]) -> None:
         self._spent = {part: before.get(f"seconds_{part}", 0.0) for part in ("physics", "evaluation")}
@@ -258,7 +262,7 @@ class Seconds:
 
     @contextmanager
     def of(self, part: str) -> Iterator[None]:
-        """A block, or a decorated function, of this part. Blocks within it count for their own parts alone."""
+        """Add the time of a block or decorated function to a ``part``; blocks within it count for their own parts."""
         begun, around, self._within = time.perf_counter(), self._within, 0.0
         try:
             yield

@@ -1,4 +1,4 @@
-"""The simplest searches: the best movement so far plus noise, or the inferred movement plus less noise.
+"""The simplest searches: the best movement so far plus noise, or theta_g plus noise.
 
 search = Perturb(problem)(estimate, goal); theta = next(search); theta = search.send(outcome) ...
 """
@@ -18,8 +18,9 @@ from sgimd_torch.spaces import Array, Estimate
 class Perturb(Search):
     """Best movement so far plus Gaussian noise.
 
-    The best theta was remembered or executed by this search. Movements are clipped to Pi; the search never ends. It
-    executes theta_g first, unless theta_g is a copy of a remembered theta, whose outcome is known.
+    The best movement is one of the exemplars of the estimate, or a movement of this search. theta_g is executed first,
+    unless it is a copy of a remembered theta, whose outcome is known. Movements are clipped to Pi; the search never
+    ends.
 
     Args:
         problem: problem to learn.
@@ -53,11 +54,11 @@ class Perturb(Search):
 class Vary(Search):
     """Answer of the inverse model plus a little Gaussian noise.
 
-    All movements vary theta_g, whatever the outcomes. The movements are clipped to Pi; the search never ends.
+    All movements vary theta_g; their outcomes do not change the search. Movements are clipped to Pi; the search never
+    ends. If theta_g is a copy of a remembered theta, the standard deviation is half of the `Width` of exploration.
 
-    The outcomes correct the inverse model, and show how the outcome changes with theta. The search is meant for an
-    inverse model that is nearly right, and for one or two movements at each goal. If theta_g is a copy of a remembered
-    theta, the noise is larger: half of the `Width` of exploration.
+    The search is meant for an accurate inverse model and for one or two movements at each goal. The outcomes correct
+    the inverse model, and show how the outcome changes with theta.
 
     Args:
         problem: problem to learn.

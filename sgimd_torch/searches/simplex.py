@@ -20,30 +20,28 @@ from sgimd_torch.spaces import Array, Box, Estimate
 class NelderMead(Search):
     """Nelder-Mead simplex around remembered movements, with a little noise on every movement.
 
-    It minimises the distance to the goal, from theta_g and its neighbours.
-
-    The first movement is theta_g, with noise. Neighbours become vertices with their remembered outcomes, which costs no
-    movement (but takes outcomes in nearby contexts for outcomes in this context). A neighbour on a line, plane ...
-    through better vertices is left out, because a flat simplex cannot turn.
+    The search minimises the distance to the goal. The first vertex is theta_g, with noise. The other vertices are
+    exemplars of the estimate with their remembered outcomes, so they need no movement; outcomes in nearby contexts
+    count as outcomes in this context. An exemplar in the affine hull (the flat) of better vertices is left out, because
+    the simplex cannot leave the flat of its vertices. If exemplars are missing, random steps from theta_g are executed.
 
     Args:
         problem: problem to learn.
         noise: standard deviation of the noise of every movement, as a fraction of each parameter's range in Pi; the
-            vertex is the noisy movement. Deviation: the paper adds no noise. But a simplex searches the flat through
-            its vertices, and neighbours from memory span the same flat again and again. Without new directions the
-            learner soon repeats itself, and its inverse model cannot tell noise from the effect of theta.
-        step: size of the steps that replace missing neighbours, as a fraction of the ranges in Pi (root mean square).
-            Deviation: the usual first simplex steps along one coordinate at a time, but one knot of one joint often
-            hardly moves the float. These steps go in random directions, and no noise is added to them.
-        complete: true fills the simplex up to theta_dim + 1 vertices, the paper's 26, by one movement each; false
-            fills it up to outcome_dim + 1, so neighbours often suffice. The search then stays in the flat through the
-            vertices, which usually contains a solution, as theta is redundant. Deviation: False is the default, because
-            25 steps would be the whole budget of a goal.
-        xatol: size of the simplex, in the unit of theta, at which the search ends, if fatol holds, too. Below
-            the noise of the outcomes a simplex cannot tell better from worse, so by default the search ends early.
-            Deviation: the paper names no such end.
-        fatol: difference of the vertices' distances from the goal, in the unit of outcomes, at which the search ends,
-            if xatol holds, too.
+            vertex is the noisy movement. Deviation: the paper adds no noise. But a simplex stays in the flat of its
+            vertices, and remembered exemplars often span the same flat. Without new directions the learner soon repeats
+            its movements, and the inverse model cannot tell noise from the effect of theta.
+        step: size of the random steps, as a fraction of the ranges in Pi (root mean square). Deviation: the steps of a
+            first simplex usually change one coordinate each, but one knot of one joint often hardly moves the float. No
+            noise is added to these steps.
+        complete: true: the simplex has theta_dim + 1 vertices, the paper's 26; false: outcome_dim + 1 vertices, for
+            which exemplars often suffice. The flat of so few vertices usually contains a solution, as theta is
+            redundant. Deviation: false is the default, because 25 random steps would exceed the budget of a goal.
+        xatol: size of the simplex, in the unit of theta, below which the search ends if the condition of ``fatol``
+            holds, too. A simplex whose outcomes differ by less than the noise cannot tell better from worse, so the
+            default is large. Deviation: the paper gives no such size.
+        fatol: difference of the vertices' distances from the goal, in the unit of outcomes, below which the search ends
+            if the condition of ``xatol`` holds, too.
 
     Raises:
         ValueError: ``step`` is not in (0, 0.5], or ``noise`` is not in [0, 0.5].
@@ -96,7 +94,7 @@ exact = partial(NelderMead, noise=0.0)
 """Nelder-Mead simplex around remembered movements, without noise."""
 
 complete = partial(NelderMead, noise=0.0, complete=True, xatol=1e-4, fatol=1e-4)
-"""Nelder-Mead simplex without noise, with all 26 vertices as in the paper; ends with the budget."""
+"""Nelder-Mead simplex without noise, with theta_dim + 1 vertices (26 for the rod), as in the paper."""
 
 
 def simplex_descent(
@@ -110,7 +108,7 @@ def simplex_descent(
     """Nelder & Mead's method from a simplex with known values: yields points; the caller sends their values.
 
     It visits the points that ``scipy.optimize.minimize(method="Nelder-Mead")`` visits after its first simplex, bit for
-    bit. (Of equal values the newest ranks last, as Lagarias et al. demand; in scipy an unstable sort decides.)
+    bit. (The newest of equal values ranks last, as Lagarias et al. demand; in scipy the order of equal values is open.)
 
     Args:
         vertices: ``(n + 1, dim)``. With n < dim the search stays in the n-dimensional flat through the vertices,
@@ -118,8 +116,10 @@ def simplex_descent(
         values: ``(n + 1,)``.
         place: function that moves a point to an allowed one, for example into a box; None: no change. (If ``place``
             only clips, a simplex with all vertices on one face of the box cannot leave this face.)
-        xatol: distance between vertices in every coordinate at which the descent ends, if ``fatol`` holds, too.
-        fatol: difference of the values at which the descent ends, if ``xatol`` holds, too.
+        xatol: largest difference of the vertices from the best vertex, in any coordinate, at which the descent ends if
+            the condition of ``fatol`` holds, too.
+        fatol: largest difference of the values from the best value at which the descent ends if the condition of
+            ``xatol`` holds, too.
 
     Raises:
         ValueError: there are fewer than two vertices, or vertices and values differ in number.
@@ -133,7 +133,7 @@ def simplex_descent(
     n = len(vertices) - 1
 
     def beyond(centre: Array, distance: float) -> Array:
-        """The point at ``distance`` on the line from the worst vertex (-1) through the ``centre`` of the others (0)."""
+        """The point at ``distance`` on the line through the worst vertex (at -1) and the others' ``centre`` (at 0)."""
         point = (1 + distance) * centre - distance * vertices[-1]
         return point if place is None else place(point)
 
@@ -166,9 +166,9 @@ def simplex_descent(
 
 
 class _Flat:
-    """The flat (affine hull) through the vertices of an unfinished simplex; it tells which points lie outside."""
+    """The flat (affine hull) of the vertices of an unfinished simplex, to find points outside the flat."""
 
-    _SINE = 0.1  # sine of 6 degrees; with a vertex at a smaller angle to the flat, a simplex hardly turns
+    _SINE = 0.1  # sine of 6 degrees, the least angle between the flat and the edge to a new vertex
 
     def __init__(self, origin: Array, shortest: float) -> None:
         self._origin = origin
@@ -177,7 +177,7 @@ class _Flat:
         self._basis = self._room[:0]  # orthonormal rows
 
     def lacks(self, point: Array) -> bool:
-        """Whether ``point`` is far enough outside to become a vertex."""
+        """Whether ``point`` is far enough outside the flat to become a vertex."""
         edge = point - self._origin
         return self._is_outside(edge, _length(self._across(edge)))
 
@@ -187,7 +187,7 @@ class _Flat:
         self._add(across, _length(across))
 
     def widen_if_lacking(self, point: Array) -> bool:
-        """Add ``point`` as a vertex if it is far enough outside, and return whether it was added."""
+        """Add ``point`` as a vertex if it is far enough outside the flat, and return whether it was added."""
         edge = point - self._origin
         across = self._across(edge)
         outside = _length(across)
@@ -213,17 +213,17 @@ class _Flat:
 
 
 def _length(vector: Array) -> float:
-    return math.sqrt(vector.dot(vector))  # value of np.linalg.norm, bit for bit, in less time
+    return math.sqrt(vector.dot(vector))  # equals np.linalg.norm bit for bit, in less time
 
 
 def _step_out(policies: Box, theta: Array, flat: _Flat, rng: np.random.Generator, step: float) -> Array:
     """A random step from ``theta`` that leads out of the flat and stays in the box.
 
-    A coordinate that would leave the box steps the other way, because clipping would flatten the simplex. In a corner
-    of a box of few dimensions this step may flatten the simplex, too; then random directions are tried.
+    A coordinate that would leave the box steps the other way, because a clipped step may lie in the flat. In a corner
+    of a box of few dimensions this step may lie in the flat, too; then random directions are tried.
     """
     direction = flat.direction_out(rng)
-    for _ in range(100):  # a step no longer than xatol never suffices
+    for _ in range(100):  # with steps no longer than xatol, no direction suffices
         change = step * np.sqrt(policies.dim) * policies.sides * direction
         forth, back = theta + change, theta - change
         vertex = policies.clip(np.where((forth < policies.low) | (forth > policies.high), back, forth))

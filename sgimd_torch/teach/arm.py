@@ -1,4 +1,4 @@
-"""The geometry of an arm in MuJoCo: where points of the arm are, and how joints move them, without forces and time.
+"""Kinematics of an arm in MuJoCo: the positions of its points, and their Jacobians.
 
 arm = Arm(led); arm.pose(q); arm.where(*arm.place_of("hand")); arm.levers(body, point)
 """
@@ -15,7 +15,7 @@ from sgimd_torch.spaces import Array, Box, check_point, read_only
 from sgimd_torch.teach.led import HandLed
 
 TURN_OR_SLIDE: Final = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
-CROSSING: Final = 1.0  # time (s) in which a joint of unknown speed crosses its range
+CROSSING: Final = 1.0  # s, assumed time in which a joint crosses its range, if the robot gives no largest speeds
 
 
 class Arm:
@@ -26,7 +26,7 @@ class Arm:
 
     Attributes:
         data: MuJoCo's data of the present posture, for drawing.
-        links: names of the bodies that led joints move and no other joints move, from the base outwards.
+        links: names of the bodies that only led joints move, from the base outwards.
         ranges: ``(n_joints,)`` box of the postures (rad; m for a slide joint).
         start: ``(n_joints,)`` posture in which movements start.
         speeds, accelerations: ``(n_joints,)`` limits (rad/s and rad/s^2).
@@ -59,10 +59,10 @@ class Arm:
         """Take the posture ``q``, ``(n_joints,)`` rad."""
         self.data.qpos[self._angles] = q
         mujoco.mj_kinematics(self._model, self.data)
-        mujoco.mj_comPos(self._model, self.data)  # mj_jac needs it
+        mujoco.mj_comPos(self._model, self.data)  # mj_jac needs its result
 
     def place_of(self, name: str) -> tuple[int, Array]:
-        """The number of the link with this body or site, and the origin of either, ``(3,)`` m in the frame of the link.
+        """Number of the link that has this body or site, and the origin of the body or site in the link's frame (m).
 
         Raises:
             ValueError: the model has no such body or site, no joint moves it, or joints that are not led move it.
@@ -77,21 +77,21 @@ class Arm:
         return body, place
 
     def where(self, body: int, place: Array) -> Array:
-        """The position ``(3,)`` m in the world of a ``place`` on a link."""
+        """World position ``(3,)`` m of the point that has the position ``place`` ``(3,)`` m in the frame of a link."""
         return np.asarray(self.data.xpos[body] + self.data.xmat[body].reshape(3, 3) @ place)
 
     def place_at(self, body: int, point: Array) -> Array:
-        """The place ``(3,)`` m, in the frame of a link, of a ``point`` of the world; the inverse of ``where``."""
+        """Position ``(3,)`` m of a world ``point`` ``(3,)`` m in the frame of a link; the inverse of ``where``."""
         return np.asarray(self.data.xmat[body].reshape(3, 3).T @ (point - self.data.xpos[body]))
 
     def levers(self, body: int, point: Array) -> Array:
-        """``(3, n_joints)`` m/rad: how each joint moves a ``point`` of the world that a link carries."""
+        """Jacobian ``(3, n_joints)`` m/rad of a point that is fixed to a link and is now at ``point`` in the world."""
         jacobian = np.zeros((3, self._model.nv))
         mujoco.mj_jac(self._model, self.data, jacobian, None, point, body)
         return jacobian[:, self._speeds]
 
     def _trouble(self, body: int) -> str:
-        """Why a body is no link of the arm; "" if it is one."""
+        """Reason why a body is not a link of the arm, "" if it is a link."""
         moved_by, above = set[int](), body
         while above:
             first = int(self._model.body_jntadr[above])

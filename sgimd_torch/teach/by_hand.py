@@ -17,19 +17,19 @@ from sgimd_torch.parts import Teacher
 from sgimd_torch.spaces import Demonstration
 
 BY_HAND: Final = "by-hand"
-"""Name of the person in a record, and on the command line."""
+"""Name of this teacher in records and on the command line."""
 
 
 class ByHand(Teacher):
-    """A person with sgimd teach; they give lessons at any time.
+    """A person who gives lessons at any time, with sgimd teach.
 
-    A run may have another teacher as well. That teacher is asked before each movement, even when the person gives a
-    lesson, so that the draws of that teacher do not change.
+    A run may have a second teacher. This teacher is asked before each movement, even if the person gives a lesson.
+    So the random draws of this teacher do not depend on the lessons.
 
     Args:
-        demonstrations: not needed.
-        rng: not needed, as nothing is drawn.
-        teacher: the other teacher, None for a person alone.
+        demonstrations: unused list, as ``give`` brings the lessons.
+        rng: unused stream, as nothing is drawn.
+        teacher: second teacher, None for a person alone.
     """
 
     needs_demonstrations = False
@@ -45,11 +45,11 @@ class ByHand(Teacher):
         self._given: Demonstration | None = None
 
     def give(self, demonstration: Demonstration) -> None:
-        """Offer this demonstration before the next movement for which the learner takes an offer."""
+        """Offer this demonstration when the learner next asks for an offer."""
         self._given = demonstration
 
     def offer(self, index: int, memory: Memory) -> Demonstration | None:
-        """The given lesson, or what the other teacher offers."""
+        """The given lesson, or else the offer of the second teacher."""
         offered = None if self.teacher is None else self.teacher.offer(index, memory)
         given, self._given = self._given, None
         self.who = "teacher" if given is None else BY_HAND

@@ -1,8 +1,8 @@
-"""A map of T that shows how near a learner has come to each place.
+"""A map of T with the predicted error of a learner at each place.
 
     chart = chart_of(robot, memory, benchmark); picture = by_error(chart, robot.outcomes)
-The predicted error at a goal is the distance from the goal to the nearest place where a movement landed. Nothing is
-executed, so a map takes milliseconds.
+The predicted error at a goal is the distance from the goal to the nearest outcome in memory. No movement is executed,
+so a map takes milliseconds.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ CELLS: Final = 60  # number of cells along each side of the map
 FAR: Final = 0.25  # predicted error of the darkest colour, as a share of T's longer side
 Colours = NDArray[np.uint8]
 
-# Colours from out of reach to reached: from dark to light, so that they differ in grey and with any colour vision.
+# Colours from a large predicted error (dark) to none (light). They differ in brightness, for colour-blind readers.
 SKILL: Final = np.array([[33, 60, 96], [40, 107, 142], [58, 154, 155], [135, 199, 132], [246, 232, 120]], float)
 
 
 @dataclass(frozen=True, eq=False)
 class Chart:
-    """The skill of a learner.
+    """The predicted errors of a learner.
 
     Attributes:
         error: ``(CELLS, CELLS)`` predicted error (m), with a row for each y and a column for each x.
         mean_error: mean predicted error (m) at the goals of the benchmark.
-        met: ``(n_goals,)`` whether the predicted error is at most half the side of a tile of the benchmark.
+        met: ``(n_goals,)`` mask of the goals whose predicted error is at most half the side of a benchmark tile.
     """
 
     error: Array
@@ -43,7 +43,7 @@ class Chart:
 
 
 def chart_of(robot: Environment, memory: Memory, benchmark: Benchmark) -> Chart:
-    """The map of what a learner can do in the middle of C.
+    """The predicted errors of a learner in the context at the middle of C.
 
     Args:
         robot: environment; the map spans the first two dimensions of its T, at the middle of its other dimensions.
@@ -71,7 +71,7 @@ def _cells(outcomes: Box) -> Array:
 
 
 def by_error(chart: Chart, outcomes: Box) -> Colours:
-    """The predicted error as a picture ``(CELLS, CELLS, 3)`` with y upwards: light within reach, dark out of reach."""
+    """Picture ``(CELLS, CELLS, 3)`` of the predicted error, y upwards: light where it is small, dark where large."""
     skill = np.clip(1 - chart.error[::-1] / (FAR * outcomes.sides[:2].max()), 0, 1)
     places = np.linspace(0, 1, len(SKILL))
     return np.stack([np.interp(skill, places, channel) for channel in SKILL.T], axis=-1).astype(np.uint8)

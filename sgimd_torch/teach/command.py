@@ -1,10 +1,11 @@
 """Teach a learner by hand, in a browser.
 
-Lead the arm, show your movement to the learner, and see what it can do now. Only this machine has access to the page.
+Lead the arm, show your movement to the learner, and see what the learner can do then. Only this machine can open the
+page.
 
 Examples:
   sgimd teach                                           a new learner on the fishing rod, into runs/taught/seed-000
-  sgimd teach runs/taught/seed-000                      go on with an earlier run, whether taught or not
+  sgimd teach runs/taught/seed-000                      continue an earlier run, even one without lessons
   sgimd teach --environment planar-arm-7 --seed 3       a new learner, with options of sgimd run
 """
 
@@ -71,9 +72,9 @@ def serving(port: int, token: str) -> Iterator[ViserServer]:
     """A web server on 127.0.0.1, at the first free port from ``port`` on; it answers only requests with the ``token``.
 
     Raises:
-        ValueError: ``port`` is not the number of a port, or no port from it on is free.
+        ValueError: ``port`` is no port number, or no port from ``port`` on is free.
     """
-    import viser  # loaded only when it is needed
+    import viser  # slow to load, and an optional dependency
 
     from sgimd_torch.teach.guard import guarded
 
@@ -90,12 +91,12 @@ def parser() -> argparse.ArgumentParser:
     """The options of ``sgimd teach``."""
     parser = parser_of("teach", __doc__, usage="sgimd teach [RUN | options of sgimd run] [--port N]")
     parser.add_argument("--port", type=int, default=8080, help="first port to try (default: 8080)")
-    parser.add_argument("--trust", action="store_true", help="permit executing code that the settings of RUN name")
+    parser.add_argument("--trust", action="store_true", help="execute the user's code that the settings of RUN name")
     return parser
 
 
 def options_of(argv: Sequence[str]) -> tuple[Config, int]:
-    """The run that is taught, and the first port to try."""
+    """The settings of the taught run, and the first port to try."""
     options, words = parser().parse_known_args(argv)
     if words and not words[0].startswith("-"):
         path = Path(words[0])

@@ -1,8 +1,8 @@
-"""Access to the page: only requests that have the token, a part of the page's address, are answered.
+"""Access to the page: the server answers only requests with a token, which is a part of the page's address.
 
     with guarded(token): server = viser.ViserServer(host="127.0.0.1", port=port)
-Any web page that is open in a browser can send requests to this machine. So a request needs the token, from the address
-or from the cookie that an earlier request got. The Host and Origin of the request must be this machine.
+Any web page that is open in a browser can send requests to this machine. So each request must have the token, either in
+its address or in a cookie, which the first answer sets. Its Host and Origin must be this machine.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from websockets.http11 import Request, Response
 
 Process = Callable[[Any, Request], Response | None]
 OWN: Final = ("127.0.0.1", "localhost", "::1")
-LONGEST: Final = 200  # most characters of an address, because a file name has at most 255
+LONGEST: Final = 200  # largest length of an address; viser looks it up as a file name, which has at most 255 bytes
 
 
 @contextmanager
@@ -46,7 +46,7 @@ def guarded(token: str) -> Iterator[None]:
 
 
 def guard(token: str, process: Process) -> Process:
-    """``process`` for requests that have the token and come from pages of this machine; other requests are refused."""
+    """A wrapper of ``process`` that refuses requests without the token, and requests from pages of other machines."""
     name = f"teach-{hmac.digest(token.encode(), b'cookie', 'sha256').hex()[:8]}"
 
     def guarded(connection: Any, request: Request) -> Response | None:

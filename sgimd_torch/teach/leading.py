@@ -1,8 +1,8 @@
 """Kinesthetic teaching without a robot: a compliant arm follows a hand, and its movement is recorded.
 
-Section 5.3 of Nguyen & Oudeyer (2014): demonstrator 3 led the arm by the hand. Here the arm is a MuJoCo model without
-weight. The point at which it is held follows the hand by damped least squares, within the ranges, speeds and
-accelerations of the joints. A released arm stays where it is.
+Section 5.3 of Nguyen & Oudeyer (2014): demonstrator 3 led the arm by the hand. Here the arm is a kinematic model in
+MuJoCo. The held point follows the hand by damped least squares, within the ranges, speeds and accelerations of the
+joints. A released arm stays where it is.
     leading = Leading(hand_led_of(task)); leading.grab("hand"); leading.begin_recording()
     for point in path: leading.drag(point); leading.step(0.02)
     leading.release(); times, joints = leading.end_recording()
@@ -20,17 +20,17 @@ from sgimd_torch.teach.arm import Arm
 from sgimd_torch.teach.led import HandLed
 
 STEP: Final = 0.01  # time (s) from one posture of the arm to the next
-FOLLOW: Final = 15.0  # 1/s, rate at which a held point follows; nearly all of a jump takes 5 / FOLLOW s
-SUPPLE: Final = 0.03  # time (s) in which a joint takes up a speed, so that the arm does not tremble with the hand
-DAMPING: Final = 0.1  # damping of the least squares relative to the levers; it slows joints near a stretched posture
-BRAKES: Final = 0.88  # share of the largest acceleration that braking aims at; its last step may take 9/8 of this share
+FOLLOW: Final = 15.0  # 1/s, rate at which the held point follows the hand; 5 / FOLLOW s after a jump it is nearly there
+SUPPLE: Final = 0.03  # s, time constant of the joint speeds, which keeps the tremor of the hand from the arm
+DAMPING: Final = 0.1  # damping of the least squares, relative to the Jacobian; it slows joints near a stretched posture
+BRAKES: Final = 0.88  # planned deceleration, as a share of the largest; the last time step may need 9/8 of the plan
 
 
 class _Hand:
-    """Holds a ``place`` ``(3,)`` m on a ``body``, in the frame of the body, and pulls it to ``target`` ``(3,)`` m.
+    """A hand that holds the point ``place`` ``(3,)`` m in the frame of a ``body``, and pulls it to ``target`` (m).
 
-    A browser sends the place of a hand about 20 times a second, so the target jumps. The arm follows ``_wanted`` (m)
-    instead, which goes after the target in a critically damped motion of velocity ``_pull`` (m/s).
+    A browser sends the position of the hand about 20 times a second, so the target jumps. The arm follows the point
+    ``_wanted`` (m), which approaches the target in a critically damped motion with the velocity ``_pull`` (m/s).
     """
 
     def __init__(self, body: int, place: Array, target: Array) -> None:
@@ -38,17 +38,17 @@ class _Hand:
         self._wanted, self._pull = target, np.zeros(3)
 
     def follow(self, point: Array) -> Array:
-        """``(3,)`` m/s, the wished velocity of the held ``point`` in the next step."""
+        """``(3,)`` m/s, the desired velocity of the held ``point`` in the next step."""
         self._pull = self._pull + STEP * FOLLOW**2 * (self.target - self._wanted - 2 / FOLLOW * self._pull)
         self._wanted = self._wanted + STEP * self._pull
         return np.asarray(self._pull + FOLLOW * (self._wanted - point))
 
 
 class Leading:
-    """An arm that a hand leads. ``step`` moves it no farther than its limits allow in that time.
+    """An arm that a hand leads, within the limits of its joints.
 
     Args:
-        led: the robot.
+        led: model, joints and limits of the robot.
 
     Attributes:
         arm: geometry and limits of the arm, in the present posture.
@@ -106,7 +106,7 @@ class Leading:
 
         Args:
             body: name of a body or site; None for the robot's own hand.
-            point: ``(3,)`` m in the world, the touched point; None for the origin of ``body``.
+            point: ``(3,)`` m, touched point in the world; None for the origin of ``body``.
 
         Raises:
             ValueError: the model has no such body, the led joints do not move it, or other joints move it, too.
@@ -128,14 +128,14 @@ class Leading:
         self._held.target = check_point("target", target, 3, "in m").copy()
 
     def release(self) -> None:
-        """Let go; the arm comes to rest within about a tenth of a second, and stays there."""
+        """Release the arm, which comes to rest within about 0.1 s and stays there."""
         self._held = None
 
     def step(self, dt: float) -> None:
         """Let ``dt`` (s) pass, in steps of ``STEP``; a remainder of ``dt`` counts for the next call.
 
         Raises:
-            ValueError: ``dt`` is not a time of 0 s or more.
+            ValueError: ``dt`` is negative or not finite.
         """
         if not 0 <= dt < np.inf:
             raise ValueError(f"dt must be a time in s, 0 or more, got {dt}")
@@ -172,17 +172,17 @@ class Leading:
         held = self._held
         wish = np.zeros(len(self._q)) if held is None else self._towards(held.follow(self.point), held.body)
         speed = self._within(wish)
-        q = self.arm.ranges.clip(self._q + speed * STEP)  # the clip removes errors of rounding
+        q = self.arm.ranges.clip(self._q + speed * STEP)  # the clip removes rounding errors
         self._speed, self._q = (q - self._q) / STEP, q
         self.arm.pose(self._q)
         if self._postures is not None:
             self._postures.append(self.q)
 
     def _towards(self, velocity: Array, body: int) -> Array:
-        """``(n_joints,)`` rad/s that move the held point with this ``velocity`` ``(3,)`` m/s, by damped least squares.
+        """Joint speeds ``(n_joints,)`` rad/s that give the held point a ``velocity`` ``(3,)`` m/s.
 
-        If a joint would be too fast, all of them slow down, so that the direction stays. A joint that would leave its
-        range stops in time, and the other joints make up for it.
+        If a joint would be too fast, all joints slow down by one factor, which keeps the direction. A joint that would
+        leave its range stops in time, and the other joints compensate.
         """
         levers = self.arm.levers(body, self.point)
         damping = (DAMPING**2 * np.square(levers).sum() / 3 + 1e-12) * np.eye(3)
@@ -203,18 +203,18 @@ class Leading:
         return speed
 
     def _slower(self, wish: Array) -> float:
-        """The share of the wished speeds, at most 1, at which no joint exceeds its limit."""
+        """The largest factor, at most 1, that keeps ``wish`` (rad/s) within the speed limits of the joints."""
         return min(1.0, float((self.arm.speeds / np.maximum(np.abs(wish), 1e-12)).min()))
 
     def _within(self, wish: Array) -> Array:
-        """The speeds ``(n_joints,)`` rad/s of the next step: they approach the scaled ``wish`` within all limits."""
+        """Joint speeds ``(n_joints,)`` rad/s of the next step, which approach ``wish`` within all limits."""
         change = (self._slower(wish) * wish - self._speed) * min(1.0, STEP / SUPPLE)
         most, fastest = self.arm.accelerations * STEP, self.arm.speeds
         low, high = self._brakes()
         return np.clip(np.clip(self._speed + np.clip(change, -most, most), -fastest, fastest), low, high)
 
     def _brakes(self) -> tuple[Array, Array]:
-        """``(n_joints,)`` rad/s each: the least and greatest speed from which a joint still stops within its range."""
+        """Least and greatest speeds, ``(n_joints,)`` rad/s each, from which the joints still stop in their ranges."""
         brakes, ranges = BRAKES * self.arm.accelerations, self.arm.ranges
 
         def fastest(distance: Array) -> Array:

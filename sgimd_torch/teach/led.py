@@ -1,4 +1,4 @@
-"""Robots that a person can lead by the hand: a MuJoCo model, its joints that are led, and their limits.
+"""Robots that a person can lead by the hand: a MuJoCo model, the led joints of the model, and their limits.
 
     led = hand_led_of(task); led.joints
 The arm and the rod are known here. A robot of your own needs an attribute ``hand_led``.
@@ -24,14 +24,15 @@ class HandLed:
     """A robot that a person can lead by the hand; `Arm` checks it.
 
     Args:
-        model: MuJoCo model whose initial posture is the start of movements, or differs from it in led joints only.
+        model: MuJoCo model; its initial posture is the start of all movements, except for the led joints.
         joints: names of the joints that a policy moves, in the order of a recording's columns.
-        hand: name of the body or site by which the robot is led if nothing else is grabbed.
+        hand: name of the body or site by which a person usually leads the robot.
         ranges: ``(n_joints,)`` ranges (rad; m for a slide joint); None for the ranges in the model.
         start: ``(n_joints,)`` posture in which every movement starts; None for the initial posture of the model.
-        speeds: ``(n_joints,)`` rad/s, largest speeds of the robot's own movements; None for 1.5 ranges per s, so that a
-            range takes about a second. The hand cannot lead the arm faster, as the robot could not repeat that.
-        accelerations: ``(n_joints,)`` rad/s^2, largest accelerations of such movements; None for 6 ranges per s^2.
+        speeds: ``(n_joints,)`` rad/s, largest speeds of the robot's own movements, which limit the led movements, too.
+            None for 1.5 times the range per s, the largest speed of a smooth movement of 1 s over the range.
+        accelerations: ``(n_joints,)`` rad/s^2, largest accelerations of the robot's own movements; None for 6 times the
+            range per s^2.
     """
 
     model: mujoco.MjModel
@@ -49,15 +50,15 @@ class Leadable(Protocol):
 
     @property
     def hand_led(self) -> HandLed:
-        """The robot as a hand leads it, in the context 0."""
+        """Model, led joints and limits of the robot in the context 0."""
         ...
 
 
 def hand_led_of(task: Task) -> HandLed:
-    """The robot of a task, as a hand leads it.
+    """Model, led joints and limits of the robot of a task.
 
     Raises:
-        ValueError: the robot cannot be led, or it has no correspondence that translates recordings.
+        ValueError: the robot cannot be led, or it has no correspondence to translate recordings.
     """
     robot = task.environment
     if isinstance(robot, Leadable) and isinstance(robot.hand_led, HandLed):
@@ -85,7 +86,7 @@ def arm_led(arm: PlanarArm) -> HandLed:
     """A planar arm, led by its end, no faster than in a smooth movement of 1 s."""
     n, limits = arm.policies.dim, arm.angles(np.ones(arm.policies.dim))
     names = tuple(f"joint_{k}" for k in range(n))
-    fastest = 1.5 * limits, 6 * limits  # largest derivatives of 3 t^2 - 2 t^3
+    fastest = 1.5 * limits, 6 * limits  # largest speed and acceleration of 3 t^2 - 2 t^3
     return HandLed(planar_model([1 / n] * n), names, "end", Box(-limits, limits), np.zeros(n), *fastest)
 
 

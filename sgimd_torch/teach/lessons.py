@@ -1,10 +1,10 @@
-"""Lessons by hand: what a recording of a led arm teaches, and which part of it the robot cannot repeat.
+"""Lessons by hand: demonstrations made of recordings of a led arm, with remarks on what the robot cannot repeat.
 
 Section 4.1 of Nguyen & Oudeyer (2014): the correspondence, eqs. (5) and (6), turns a led trajectory into theta_d; the
 robot executes theta_d, and the outcome of this movement is the outcome of the lesson.
     lesson = lesson_by_hand(*moving(*leading.end_recording()), task, stream(seed, "lessons", 0))
     save_demonstrations("mine.npz", [lesson.demonstration])
-The file holds everything that the learner is shown, so a loaded lesson has an equal theta_d, bit for bit.
+The file has the whole recording, so a loaded lesson gives an equal theta_d, bit for bit.
 """
 
 from __future__ import annotations
@@ -21,21 +21,21 @@ from sgimd_torch.spaces import Array, Demonstration, read_only
 from sgimd_torch.teach.led import HandLed, hand_led_of
 
 RATE: Final = 50.0  # Hz, sampling rate of the shipped demonstrations and of motor primitives
-FASTER: Final = 1.02  # multiple of the largest speed of the robot's own movements, above which a joint gets a remark
-MOVES: Final = 0.02  # rad/s; an arm that was never faster counts as unmoved
-STILL: Final = 0.05  # share of the largest speed; while all joints are slower, the arm counts as pausing
+FASTER: Final = 1.02  # multiple of the robot's largest speed; a joint that was led faster gets a remark
+MOVES: Final = 0.02  # rad/s; an arm whose joints were never faster counts as unmoved
+STILL: Final = 0.05  # share of the recording's largest speed; while all joints are slower, the arm counts as pausing
 AWAY: Final = 0.05  # rad; a recording that starts farther from the start of movements gets a remark
 
 
 @dataclass(frozen=True, eq=False)
 class HandLesson:
-    """A lesson for the learner, and how well the robot can follow it.
+    """A lesson for the learner, with remarks on what the robot cannot repeat.
 
     Attributes:
         demonstration: the recording, with the outcome of one execution of ``theta_d``.
         theta_d: ``(theta_dim,)`` policy that the correspondence gives for the recording.
-        misfit: distance between recording and movement (rad), see `misfit_of`.
-        remarks: a sentence for each thing that the robot cannot follow.
+        misfit: distance (rad) from the recording to the movement that the robot plays, see `misfit_of`.
+        remarks: sentences, one for each property of the recording that the robot cannot repeat.
     """
 
     demonstration: Demonstration
@@ -53,15 +53,15 @@ def lesson_by_hand(times: Array, joints: Array, task: Task, rng: np.random.Gener
         times: ``(n_times,)`` s, increasing from 0.
         joints: ``(n_times, n_joints)`` rad, postures of the led arm.
         task: task of the learner, whose robot was led.
-        rng: random stream of the noise of this movement, such as ``stream(seed, "lessons", number)``.
+        rng: random stream of the motor noise, such as ``stream(seed, "lessons", number)``.
 
     Raises:
         ValueError: the robot cannot be led, or its correspondence refuses the recording.
-        SimulationError: theta_d has no outcome.
+        SimulationError: the execution of ``theta_d`` fails.
     """
     robot, led = task.environment, hand_led_of(task)
     longest = primitive_of(robot).durations[1]
-    played = times / times[-1] * longest if times[-1] > longest else times  # the last time is exactly longest
+    played = times / times[-1] * longest if times[-1] > longest else times  # the last time equals longest exactly
     even, trajectory = resampled(played, joints)
     theta_d = robot.policies.check("theta_d", correspondence_of(task)(even, trajectory))
     context = robot.contexts.low + robot.contexts.sides / 2
@@ -85,13 +85,13 @@ def moving(times: Array, joints: Array) -> tuple[Array, Array]:
 
 
 def resampled(times: Array, joints: Array) -> tuple[Array, Array]:
-    """The recording at equal time steps, at least ``RATE`` a second; its first and last posture are kept."""
+    """The recording at equal time steps, at least ``RATE`` steps per s, with its first and its last posture."""
     even = np.linspace(0.0, times[-1], max(2, int(np.ceil(times[-1] * RATE - 1e-9)) + 1))
     return even, np.stack([np.interp(even, times, column) for column in joints.T], axis=1)
 
 
 def _unlike_led(times: Array, played: Array, joints: Array, led: HandLed) -> list[str]:
-    """A sentence for each difference between a recording at ``times`` and its repetition at the times ``played``."""
+    """A sentence for each way in which the robot's repetition at the times ``played`` must differ from a recording."""
     remarks = []
     if times[-1] > played[-1]:
         faster = times[-1] / played[-1]

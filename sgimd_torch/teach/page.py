@@ -1,7 +1,7 @@
-"""The page: a loop moves the led arm and shows the status; a second thread moves the learner.
+"""The page: a loop moves the led arm and shows the status, while the learner works in a second thread.
 
     with serving(8080, token) as server: Page(server, TaughtRun(config)).run()
-The actions of viewers go through a queue to the loop. All viewers see the same page, and each may use all of it.
+The actions of viewers go through a queue to the loop. All viewers see and control the same page.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from sgimd_torch.teach.panel import Panel
 from sgimd_torch.teach.scene import Scene
 from sgimd_torch.teach.taught import Status, TaughtRun
 
-TICK: Final = 1 / 30  # time (s) from one picture to the next
-BLOCK: Final = 10  # number of movements of the learner between two updates
-FAREWELL: Final = 0.3  # time (s) in which the last message reaches the viewers
+TICK: Final = 1 / 30  # s, time from one picture to the next
+BLOCK: Final = 10  # number of movements of the learner between two updates of the page
+FAREWELL: Final = 0.3  # s, wait before the server stops, in which the last message reaches the viewers
 ENDED: Final = (
     '<div style="padding:0 .6em;color:#a33"><b>This session has ended.</b> '
     "Everything is kept; to go on: <code>sgimd teach {0}</code></div>"
@@ -35,16 +35,16 @@ ENDED: Final = (
 
 
 class Page:
-    """What viewers see and do.
+    """The scene and the controls that viewers see, and their actions.
 
     Args:
         server: web server of the page.
-        taught: run that is taught; the method ``run`` of the page closes it at the end.
+        taught: run that is taught; ``Page.run`` closes this run at the end.
 
     Attributes:
         lesson: lesson of the last recording, None if there is none.
         status: last status of the run, None before the first one.
-        running: whether the learner moves by itself; at first it waits for a lesson.
+        running: whether the learner moves by itself, False at first.
 
     Raises:
         ValueError: the robot cannot be led by the hand.
@@ -54,7 +54,7 @@ class Page:
         self.server, self.taught = server, taught
         robot, led = taught.parts.environment, hand_led_of(taught.parts.task)
         self.leading = Leading(led)
-        self._hand, self._offset = led.hand, np.zeros(3)  # (3,) m from the mouse to the held point
+        self._hand, self._offset = led.hand, np.zeros(3)  # (3,) m, vector from the mouse to the held point
         self.scene = Scene(server, led, self.leading.arm.links, robot.outcomes, taught.parts.benchmark.goals)
         self.panel = Panel(server, self._act, robot.outcomes, taught.config.movements, taught.cannot_be_taught)
         self.lesson: HandLesson | None = None
@@ -68,7 +68,7 @@ class Page:
         for body, handle in self.scene.grips:
             self._listen_to(body, handle)
 
-        # Callbacks are coroutines, here and below, because viser calls other functions out of order.
+        # All callbacks are coroutines, because viser may call plain functions out of order.
         @server.on_client_disconnect
         async def _(client: viser.ClientHandle) -> None:
             self._tasks.put(self._tab_closed)
@@ -116,7 +116,7 @@ class Page:
             self._before = None
 
     def _work_until(self, until: float) -> None:
-        """Do what viewers want, until the next picture is due."""
+        """Perform the queued actions of viewers until the time ``until``."""
         with contextlib.suppress(Empty):
             while True:
                 self._tasks.get(timeout=max(0.0, until - time.monotonic()))()
@@ -128,7 +128,7 @@ class Page:
             self._later(event.client, lambda: self._drag(phase, body, start, end))
 
     def _later(self, client: viser.ClientHandle, what: Callable[[], object]) -> None:
-        """Let the loop do what a viewer wants; a failure is reported to that viewer."""
+        """Queue the action ``what`` of a viewer for the loop; a failure is reported to this viewer."""
 
         def carefully() -> None:
             try:
@@ -149,7 +149,7 @@ class Page:
         self._later(client, actions[name])
 
     def _drag(self, phase: str, body: str, start: Array, end: Array) -> None:
-        """The mouse grabs a ``body`` at ``start``, moves to ``end``, or releases it there; ``(3,)`` m."""
+        """Grab a ``body`` at ``start`` ``(3,)`` m, pull it to ``end`` ``(3,)`` m, or release it, as the mouse does."""
         if phase == "start":
             self.leading.grab(body, None if body == self._hand else start)
             self._offset = self.leading.point - start
@@ -159,7 +159,7 @@ class Page:
             self.leading.drag(end + self._offset)
 
     def _tab_closed(self) -> None:
-        """Release the arm, and end a recording, because perhaps nobody is left to do so."""
+        """Release the arm and end a recording, as the viewer who left may have been the last one."""
         self.leading.release()
         if self.leading.recording:
             self.leading.end_recording()

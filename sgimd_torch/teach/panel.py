@@ -1,7 +1,7 @@
 """The controls of the page: three numbered steps, and the status of the learner.
 
     panel = Panel(server, act, space, 5000, ""); panel.show_lesson(lesson); panel.show_status(status, running=True)
-A button calls ``act(name, client)`` with its name in ``ACTIONS`` and the viewer who pressed it.
+A button calls ``act(name, client)``: ``name`` is its key in ``ACTIONS``, ``client`` the viewer who pressed it.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Panel:
         server: web server of the page.
         act: function to call when a button is pressed.
         space: T.
-        total: movements of the whole run.
+        total: number of movements of the whole run.
         cannot: reason why the learner cannot be taught, "" if it can.
     """
 
@@ -114,7 +114,7 @@ class Panel:
         place = ", ".join(f"{x:.2f}" for x in lesson.demonstration.outcome)
         words = f"It lands at **({place}) {self._space.unit}**, the orange ring."
         if np.isfinite(lesson.misfit):
-            words += f" The robot plays it within **{lesson.misfit:.3f} rad** of your movement."
+            words += f" The robot repeats your movement to **{lesson.misfit:.3f} rad** (root mean square)."
         remarks = lesson.remarks or ["the robot can follow everything"]
         self.lesson.content = "\n".join([words, "", *(f"- {remark}" for remark in remarks)])
 

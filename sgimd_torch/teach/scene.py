@@ -1,7 +1,7 @@
 """The scene: the robot that a hand leads, and the map of T on the ground.
 
     scene = Scene(server, led, links, outcomes, goals); scene.draw_arm(leading.data, leading.hand)
-A place in T is drawn at this place in the plane z = 0 of the model, so movements are seen to land on the map.
+The map of T lies in the plane z = 0 of the model, at the places of the outcomes, so movements end on the map.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ SEEN: Final = 1e-4  # share of the map's longer side; a robot that has moved les
 
 
 class Scene:
-    """Everything that is drawn.
+    """The robot and the map of T, drawn in a browser.
 
     Args:
         server: web server of the page.
-        led: the robot.
+        led: model and led joints of the robot.
         links: names of the bodies that a hand leads; other bodies, such as the line of the rod, are not drawn.
         outcomes: T.
         goals: ``(n_goals, outcome_dim)`` goals of the benchmark.
@@ -60,14 +60,14 @@ class Scene:
         self._mark = self._scene.add_mesh_simple("/mark", ring.vertices, ring.faces, color=HAND, visible=False)
         names = [model.body(model.geom_bodyid[k]).name for k in shown]
         self.grips = [(led.hand, self._hand), *zip(names, self._geoms.values(), strict=True)]
-        # Without a GPU a browser draws this 25 times a second, but only twice with environment map, shadows or water.
+        # Without a GPU a browser draws 25 pictures a second, but only two with environment map, shadows or water.
         self._scene.configure_environment_map(None)
         self._scene.configure_default_lights(cast_shadow=False)
         self._scene.add_light_ambient("/light", intensity=0.6)
         self._look(server, middle)
 
     def ground(self, points: Array, layer: int = 0) -> Array:
-        """Points ``(..., 3)`` m of the scene for places ``(..., outcome_dim)`` of T; a higher ``layer`` lies higher."""
+        """Scene points ``(..., 3)`` m of places ``(..., outcome_dim)`` in T; a greater ``layer`` lies higher."""
         points = np.asarray(points)
         flat = np.zeros((*points.shape[:-1], 3))
         flat[..., : min(2, points.shape[-1])] = points[..., :2]
@@ -85,12 +85,12 @@ class Scene:
         self._hand.position = hand
 
     def draw_map(self, chart: Chart) -> None:
-        """Draw the skill of the learner on the ground, and the goals of the benchmark on it."""
+        """Draw the map of predicted errors on the ground, and the goals of the benchmark on the map."""
         self.map.image = by_error(chart, self._outcomes)
         self._goals.colors = np.where(chart.met[:, None], MET, UNMET).astype(np.uint8)
 
     def draw_landings(self, outcomes: Array) -> None:
-        """Draw the last ``outcomes`` ``(n, outcome_dim)``."""
+        """Draw the latest ``outcomes`` ``(n, outcome_dim)``."""
         self._landings.visible = len(outcomes) > 0
         if len(outcomes):
             self._landings.points = self.ground(outcomes, 5).astype(np.float16)

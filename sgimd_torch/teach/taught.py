@@ -1,7 +1,7 @@
-"""The run that is taught: a learner that practises, gets lessons by hand, and reports its status.
+"""A run with lessons by hand: the learner moves by itself, gets lessons, and reports its status.
 
     run = TaughtRun(config); run.go_on(20); run.show(demonstration); run.status().chart.mean_error; run.close()
-One thread at a time may use it. Its directory is that of ``sgimd run``, which can resume the run.
+Only one thread at a time may use a `TaughtRun`. ``sgimd run --resume`` can continue the run.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from sgimd_torch.teach.chart import Chart, chart_of
 from sgimd_torch.teach.lessons import HandLesson, lesson_by_hand
 
 LATEST: Final = 60  # number of landings that the page shows
-IMITATIONS: Final = 10  # largest number of movements that follow a lesson at once
+IMITATIONS: Final = 10  # largest number of movements that imitate a lesson at once
 NO_MORE: Final = "the learner has made all its {0} movements; end this session, and go on with --movements {1}"
 ALONE: Final = "{0} cannot be shown a lesson by hand; sgim-d, practice-taught, imitation and observation can"
 
@@ -36,8 +36,8 @@ class Status:
         movements: movements so far.
         lessons: lessons by hand so far.
         replaying: whether the recorded movements are still being replayed.
-        landed: ``(n, outcome_dim)`` last outcomes.
-        chart: skill of the learner.
+        landed: ``(n, outcome_dim)`` latest outcomes.
+        chart: predicted errors of the learner.
     """
 
     movements: int
@@ -48,7 +48,7 @@ class Status:
 
 
 class TaughtRun:
-    """A run on disk, open for lessons. Movements that its directory holds already are replayed first.
+    """A run on disk, open for lessons. Recorded movements are replayed first.
 
     Args:
         config: settings of the run.
@@ -74,11 +74,11 @@ class TaughtRun:
         self._landed: deque[Array] = deque(maxlen=LATEST)
 
     def go_on(self, movements: int, *, until_idle: bool = False) -> Status:
-        """Make this number of further movements, or fewer if the run ends.
+        """Let the learner make further movements, or replay recorded ones.
 
         Args:
-            movements: number of movements.
-            until_idle: whether to stop earlier, at the end of an attempt.
+            movements: largest number of movements; fewer are made if the run ends.
+            until_idle: whether to stop as soon as the learner is between two attempts.
 
         Raises:
             SimulationError, ReplayError, ValueError, OSError: as ``sgimd run``.
@@ -96,7 +96,7 @@ class TaughtRun:
         """Offer a lesson before the next movement.
 
         Raises:
-            ValueError: the learner cannot be taught, or cannot use this lesson; in both cases nothing has changed.
+            ValueError: the learner cannot be taught, or cannot use this lesson; nothing has changed then.
         """
         total = self.config.movements
         if self.cannot_be_taught:
@@ -111,11 +111,11 @@ class TaughtRun:
         self._lessons += 1
 
     def imitate(self) -> Status:
-        """Make the movements by which the learner imitates the given lesson."""
+        """Let the learner imitate the given lesson."""
         return self.go_on(IMITATIONS, until_idle=True)
 
     def show(self, demonstration: Demonstration) -> Status:
-        """Give a lesson and have it imitated; raises what `give` and `go_on` raise."""
+        """Give a lesson and let the learner imitate it; raises what `give` and `go_on` raise."""
         self.give(demonstration)
         return self.imitate()
 
@@ -131,5 +131,5 @@ class TaughtRun:
         return Status(self._life.movements, self._lessons, self._life.replaying, landed, chart)
 
     def close(self) -> None:
-        """Write what is left to write, and free the directory for others."""
+        """Write the rest of the record, and release the directory for other processes."""
         self._life.close()

@@ -1,7 +1,7 @@
 """Teachers, who choose demonstrations and the times at which they show them.
 
-Sections 2.3 and 5.3 of Nguyen & Oudeyer (2014). The paper's teacher watches what the learner has reached and, every 30
-movements, demonstrates something from a tile chosen at random among those that the learner has reached least.
+Sections 2.3 and 5.3 of Nguyen & Oudeyer (2014). The paper's teacher demonstrates every 30 movements. The demonstration
+is drawn from the tile of T that the learner has reached least.
     teacher = PeriodicTeacher(load_demonstrations(), stream(seed, "teacher")); teacher.offer(index, memory)
 """
 
@@ -17,7 +17,7 @@ from sgimd_torch.memory import Memory
 from sgimd_torch.parts import Teacher
 from sgimd_torch.spaces import Array, Demonstration, check_count, check_rng, check_vector
 
-_STALLED: Final = 0.01  # relative fall of the mean distance between two looks, below which a learner has stalled
+_STALLED: Final = 0.01  # least relative fall of the mean distance between two checks; below, the learner has stalled
 
 
 Choose = Callable[[Sequence[Demonstration], Memory, np.random.Generator], Demonstration]
@@ -25,7 +25,7 @@ Choose = Callable[[Sequence[Demonstration], Memory, np.random.Generator], Demons
 
 
 def at_random(demonstrations: Sequence[Demonstration], memory: Memory, rng: np.random.Generator) -> Demonstration:
-    """Random demonstration, all equally likely."""
+    """Random demonstration; all are equally likely."""
     return demonstrations[int(rng.integers(len(demonstrations)))]
 
 
@@ -34,7 +34,7 @@ def least_explored(
 ) -> Demonstration:
     """Demonstration from the tile of outcomes that the learner has reached least.
 
-    Only tiles with demonstrations count. If several tiles are equal, one of them is drawn.
+    Only tiles with demonstrations count. If several tiles have the least number of outcomes, one of them is drawn.
 
     Args:
         demonstrations: demonstrations to choose from.
@@ -48,7 +48,7 @@ def least_explored(
     shown = [demonstration.outcome for demonstration in demonstrations]
     demonstrated = check_vector("outcomes of the demonstrations", shown, memory.outcome_dim, "is it another robot's?")
     low, high = demonstrated.min(axis=0), demonstrated.max(axis=0)
-    side = np.maximum(high - low, 1e-9) / tiles  # sizes above 0, even for demonstrations on a line
+    side = np.maximum(high - low, 1e-9) / tiles  # above 0 even if all demonstrations lie on a line
 
     def cells(outcomes: Array) -> Array:
         # The upper border belongs to the last tile; otherwise the farthest demonstrations would have their own tile.
@@ -101,7 +101,7 @@ class InitialTeacher(Teacher):
 
     Args:
         demonstrations: demonstrations to show.
-        rng: random stream of their order.
+        rng: random stream of the order.
         every: number of movements from one demonstration to the next.
     """
 
@@ -126,14 +126,13 @@ at_once = partial(InitialTeacher, every=1)
 class AskedTeacher(Teacher):
     """Demonstrates when the learner's competence stalls.
 
-    Every ``patience`` movements the teacher measures the distance of the learner's nearest outcome from each
-    demonstrated outcome. If the mean distance fell by less than a hundredth since the last look, the teacher
-    demonstrates.
+    Every ``patience`` movements the teacher measures the distance of each demonstrated outcome from the learner's
+    nearest outcome. If the mean distance fell by less than 1 % since the last check, the teacher demonstrates.
 
     Args:
         demonstrations: demonstrations to choose from.
         rng: random stream of ``choose``.
-        patience: number of movements from one look at the learner to the next.
+        patience: number of movements between two checks of the learner.
         choose: choice of the next demonstration.
     """
 

@@ -1,7 +1,7 @@
-"""Make goals of evaluation from runs: one random goal in each tile of T that runs reached (section 5.2 of the paper).
+"""Make benchmark goals from runs: one random goal in each tile of T that the runs reached (section 5.2 of the paper).
 
-T is cut into tiles. A tile counts as reached if at least two movements of all runs landed in it. Use several learners:
-goals made from only one learner favour that learner. Use seeds that no comparison uses.
+T is cut into tiles. A tile counts as reached if at least two movements of all runs together landed in the tile. Use
+several learners, because goals made from only one learner favour that learner. Use seeds that no comparison uses.
 
   sgimd sweep --environment mypackage.toss:make --vary algorithm=random,sagg-riac --seeds 2000-2003 --out pool
   sgimd benchmark pool --out goals.npz
@@ -10,8 +10,8 @@ goals made from only one learner favour that learner. Use seeds that no comparis
   sgimd benchmark pool --out goals.npz --tiles 100      fewer goals, so evaluations are faster
   sgimd benchmark pool/random/seed-2000 more --out goals.npz
 
-The side of a tile is chosen to make about --tiles goals. In the plane it is a fortieth to a tenth of the sides of T.
-The file names the class of the environment; a run of another class refuses the file.
+The side of the tiles is chosen so that about --tiles goals are made. In the plane the side is between 1/40 and 1/10 of
+the sides of T. The file names the class of the environment, and runs of other environments refuse the file.
 
 Exit code: 0 the file was written, 2 the request is wrong and nothing was written.
 """
@@ -60,7 +60,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _reached_by(runs: Sequence[Run]) -> tuple[str, Box]:
-    """The class of the environment that all runs share, and the T of this environment.
+    """The name of the class of the environment of all runs, and the T of this environment.
 
     Raises:
         ValueError: the runs have different environments.

@@ -1,13 +1,14 @@
-"""Check an environment against every rule of its protocol. Each violation is named, with the likely cause.
+"""Check an environment against every rule of the environment protocol. Violations are named, with the likely cause.
 
-ENVIRONMENT is a name of the catalogue, or package.module:attribute for a class or a function that returns an
-environment or a Task, also in the working directory. The check executes random movements and two corners of Pi:
+ENVIRONMENT is a name of the catalogue, or package.module:attribute. The attribute is a class or a function that returns
+an environment or a Task; the module may be in the working directory. The check executes random movements and two
+corners of Pi:
 
   contexts, policies, outcomes    are Boxes, and rest lies in outcomes
-  observe, execute                return float64 arrays of the right shape, draw from their rng alone, and change no
-                                  argument and no earlier result
-  no state carries over           a repeated movement with an equal stream has the same outcome
-  outcome_noise                   is 0 if and only if outcomes never scatter, else it is right within a factor of ten
+  observe, execute                return float64 arrays of the right shape, draw from their rng alone, and change
+                                  neither arguments nor earlier results
+  no state carries over           a movement repeated with an equal stream has the same outcome
+  outcome_noise                   is 0 if repeated outcomes are equal, else right within a factor of ten
   execute_many (optional)         each row equals execute to the last bit
   invalid movements               are refused with a ValueError
   trace (optional)                has the same outcome as execute with an equal stream
@@ -36,8 +37,8 @@ from sgimd_torch.runs.tasks import Task, benchmark_of, demonstrations_of
 from sgimd_torch.spaces import check_count, stream
 from sgimd_torch.views.demonstrations import check
 
-TRIED = 20  # number of random movements that show which part of T is reached
-NARROW = 0.03  # share of the volume of T; if random movements span less, most goals may be out of reach
+TRIED = 20  # number of random movements that estimate the reached part of T
+NARROW = 0.03  # share of the volume of T; if the outcomes of random movements span less, a note warns the user
 
 
 def parser() -> argparse.ArgumentParser:
@@ -69,7 +70,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         check_environment(task.environment, movements=options.movements)
         _check_picture(task)
         found = [f"{name} keeps every promise", *_goals(task), *_lessons(task)]
-    except SystemExit as end:  # the exit(0) of a user would look like success
+    except SystemExit as end:  # exit(0) in the user's code would look like success
         raise ValueError(f"{name} calls exit({end}); raise an exception where a movement fails") from end
     print("\n".join(found))
     return 0
@@ -91,7 +92,7 @@ def _check_picture(task: Task) -> None:
     if not np.array_equal(drawn, outcome):
         raise ValueError(
             f"trace() of {name} ends at {drawn.tolist()}, execute() with an equal stream at "
-            f"{outcome.tolist()}; do both draw their noise in the same order?"
+            f"{outcome.tolist()}; do both methods draw their noise in the same order?"
         )
 
 
@@ -102,7 +103,7 @@ def _goals(task: Task) -> list[str]:
 
 
 def _narrow(robot: Environment) -> list[str]:
-    """A note if random movements end outside T, or span a small part of T."""
+    """A warning if random movements end outside T, or if their outcomes span a small part of T; [] for none."""
     space, rngs = robot.outcomes, [stream(k, "check") for k in range(TRIED)]
     contexts, thetas = [robot.observe(rng) for rng in rngs], [robot.policies.sample(rng) for rng in rngs]
     outcomes = execute_many(robot, contexts, thetas, rngs)

@@ -1,14 +1,14 @@
 """Three learners learn to fish; a figure and a table show their results.
 
-The three runs have the same seed, the same simulated arm and the same motor noise; two run at a time. random moves at
-random. sgim-d has curiosity and a teacher. practice-taught, the best learner of this library, executes all
-demonstrations once, then makes one movement for each goal. The command writes to --out (default: runs/demo):
+The three runs have the same seed, the same simulated arm and the same motor noise; two of them run at a time. random
+makes random movements. sgim-d has curiosity and a teacher. practice-taught, the best learner of this library, executes
+all demonstrations once, then makes one movement for each goal. The command writes to --out (default: runs/demo):
 
   random/seed-000/ and so on   the record of each run (docs/runs.md explains the files)
   demo.png                     error against movements
 
-The same command continues after Ctrl-C or a power cut; finished runs stay as they are. Options of sgimd run apply to
-all three learners; sgimd run --help lists them.
+After Ctrl-C or a power cut, repeat the command to continue; finished runs are kept. Options of sgimd run apply to all
+three learners; sgimd run --help lists these options.
 
   sgimd demo                                       the paper's 5000 movements, seed 0
   sgimd demo --movements 1000                      a first look, in half a minute
@@ -36,7 +36,7 @@ from sgimd_torch.runs.process import Failed, loading, parser_of, say
 from sgimd_torch.runs.read import finished, read_run
 
 LEARNERS: Final = {
-    "random": "moves at random",
+    "random": "makes random movements",
     "sgim-d": "chooses goals where its competence changes, and gets a demonstration every 30 movements",
     "practice-taught": "executes all demonstrations once, then makes one movement for each goal",
 }
@@ -51,7 +51,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     _, rest = parser().parse_known_args(argv)
     configs = configs_of(rest)
-    with loading():  # the extra may not be installed, so this comes before the runs
+    with loading():  # a missing extra is reported before the runs, not after them
         from sgimd_torch.figures.save import save_figure
         from sgimd_torch.runs.build import build
         from sgimd_torch.views import table
@@ -67,7 +67,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         raise Failed("\n".join(failures))
     variants = [Variant(name, [read_run(config.directory)]) for name, config in configs.items()]
     (figure,) = save_figure(partial(figure_of_curves, variants), base.out / "demo", "png")
-    print("\nMean distance to the benchmark goals after so many movements, and what a movement costs\n")
+    print("\nMean distance to the benchmark goals, by number of movements, and the time of a movement\n")
     table.main([str(base.out)])
     print(f"\nFigure  {figure}\nRuns    {base.out}\nTime    {time.monotonic() - began:.0f} s\n\nNext, try")
     print(f"  sgimd report {base.out}    # one page: curves, maps, interest")
@@ -76,13 +76,13 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def configs_of(rest: Sequence[str]) -> dict[str, Config]:
-    """The run of each learner.
+    """The settings of each learner's run, by name of the learner.
 
     Args:
         rest: options of ``sgimd run`` for all learners.
 
     Raises:
-        ValueError: an option is one that the demo decides, or it leaves nothing to draw.
+        ValueError: an option is fixed by the demo, or leaves nothing to draw.
     """
     given = {word.partition("=")[0].lstrip("-") for word in rest}
     for name in ("algorithm", "name", "environment"):
@@ -92,7 +92,7 @@ def configs_of(rest: Sequence[str]) -> dict[str, Config]:
     configs = {algorithm: parse([*words, f"--algorithm={algorithm}"])[0] for algorithm in LEARNERS}
     if not configs["sgim-d"].evaluations:
         raise ValueError("--evaluate-at [] leaves nothing to draw; choose some movements, or omit it")
-    # The noise is measured only at the end, because that takes longer than all the rest.
+    # The noise floor is measured only at the end, because measuring takes longer than everything else.
     return {name: replace(config, floor_at=(config.movements,)) for name, config in configs.items()}
 
 

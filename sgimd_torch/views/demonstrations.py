@@ -1,14 +1,14 @@
 """Check demonstrations on a robot, or import them from other formats.
 
   check    prints a line for each recording: the recorded outcome (says), the outcome on the simulated robot (lands),
-           the distance between both (apart), the distance from the recorded movement to the movement that the robot
-           plays (misfit), and the limits that the recording exceeds (remarks)
+           the distance between these outcomes (apart), the distance from the recording to the movement that the robot
+           plays (misfit), and the limits of the robot that the recording exceeds (remarks)
   import   converts recordings in CSV or in a LeRobot dataset (v3) to a file for sgimd run --demonstrations
 
 SOURCE is an .npz file of save_demonstrations, a CSV file, a folder with a CSV file for each recording, or the folder of
-a LeRobot dataset. CSV and LeRobot need the names of the columns. A column may be a vector, as in LeRobot:
-observation.state is the whole vector, and observation.state[0:6] is its first six entries. The outcome is in the last
-row of a recording, the context is in the first row.
+a LeRobot dataset. For CSV and LeRobot, options name the columns. A column may be a vector, as in LeRobot:
+observation.state is the whole vector, and observation.state[0:6] is its first six entries. The outcome is read in the
+last row of a recording, and the context in its first row.
 
 Examples:
   sgimd demonstrations check shown.npz --task fishing-rod
@@ -16,7 +16,7 @@ Examples:
   sgimd demonstrations import datasets/my_arm --joints observation.state[0:6] --outcome observation.place[0:2]
       --time timestamp --recording episode_index --degrees --out shown.npz
 
-Exit code: 0 if all recordings can be used, 2 if some cannot, or if the request is wrong.
+Exit code: 0 all recordings can be used, 2 some cannot be used, or the request is wrong.
 """
 
 from __future__ import annotations
@@ -48,11 +48,11 @@ class Checked:
     """A recording, checked on a robot.
 
     Attributes:
-        shown: the recording.
-        lands: ``(outcome_dim,)`` outcome on the robot, None if there is none.
+        shown: demonstration with the recording.
+        lands: ``(outcome_dim,)`` outcome on the robot, None if the robot cannot use the recording.
         misfit: distance from the recording to the movement that the robot plays, NaN if unknown; see `misfit_of`.
-        remarks: a sentence for each limit that the recording exceeds.
-        refused: reason for a missing outcome, "" if there is one.
+        remarks: sentences, one for each limit of the robot that the recording exceeds.
+        refused: reason why the robot cannot use the recording, "" if it can.
     """
 
     shown: Demonstration
@@ -63,7 +63,7 @@ class Checked:
 
     @property
     def apart(self) -> float:
-        """Distance between the outcomes on the robot and in the recording; NaN if the robot has none."""
+        """Distance from the recorded outcome to the outcome on the robot; NaN without an outcome on the robot."""
         return float("nan") if self.lands is None else float(np.linalg.norm(self.lands - self.shown.outcome))
 
 
@@ -75,7 +75,7 @@ def parser() -> argparse.ArgumentParser:
         source.add_argument(
             f"--{option}", type=_names, default=(), metavar="COLUMN,COLUMN", help=f"columns of the {about}"
         )
-    source.add_argument("--time", metavar="COLUMN", help="column of seconds (default: time; in LeRobot timestamp)")
+    source.add_argument("--time", metavar="COLUMN", help="column of times in s (default: time; in LeRobot timestamp)")
     source.add_argument(
         "--recording",
         metavar="COLUMN",
@@ -160,13 +160,13 @@ def read(options: argparse.Namespace) -> list[Demonstration]:
     )
     if not is_dataset:
         return read_csv(source, columns)
-    from sgimd_torch.demonstrations.lerobot import read_lerobot  # this loads pyarrow
+    from sgimd_torch.demonstrations.lerobot import read_lerobot  # loads pyarrow, an optional dependency
 
     return read_lerobot(source, columns)
 
 
 def check(task: Task, shown: Demonstration, row: int) -> Checked:
-    """Translate a recording and execute it on the robot of a task, with the noise of stream number ``row``."""
+    """Translate a recording and execute it on the robot of a task, with motor noise from the stream number ``row``."""
     robot = task.environment
     remarks = beyond_limits(robot, shown)
     try:
@@ -182,7 +182,7 @@ def check(task: Task, shown: Demonstration, row: int) -> Checked:
 
 
 def _cells(row: int, found: Checked) -> tuple[str, ...]:
-    """A row of the table, below ``HEADS``."""
+    """Cells of a recording in the table, one below each of ``HEADS``."""
     times = found.shown.times
     refused = [f"cannot be used: {found.refused}"] if found.refused else []
     return (

@@ -1,7 +1,7 @@
 """Statistics over seeds: interquartile means, bootstrap intervals, probability of improvement, Holm's method.
 
-Agarwal et al. (2021), "Deep reinforcement learning at the edge of the statistical precipice": seeds are few, so every
-number has an interval. ``errors`` are mean benchmark errors (m), one for each seed; smaller is better.
+Agarwal et al. (2021), "Deep reinforcement learning at the edge of the statistical precipice": with few seeds, every
+number needs an interval. ``errors`` are mean benchmark errors (m), one for each seed; smaller is better.
     found = iqm_interval(errors, rng=rng()); show(found)
 """
 
@@ -18,12 +18,12 @@ from sgimd_torch.spaces import Array
 Key = TypeVar("Key", bound=Hashable)
 LEVEL = 0.95
 RESAMPLES = 9999
-LEAST_SEEDS: Final = 5  # smallest number of seeds with an interval and a verdict; fewer give points
+LEAST_SEEDS: Final = 5  # smallest number of seeds for an interval and a verdict
 SEED: Final = 2014  # seed of the bootstrap; each number draws from its own default_rng(SEED)
 
 
 class Interval(NamedTuple):
-    """A statistic and its interval from ``low`` to ``high``, 95 % by default; if seeds are few, both ends are NaN."""
+    """A statistic and its interval from ``low`` to ``high``, 95 % by default; NaN if there are too few seeds."""
 
     value: float
     low: float
@@ -31,12 +31,12 @@ class Interval(NamedTuple):
 
 
 def rng() -> np.random.Generator:
-    """A fresh stream for one number."""
+    """A new random stream for the bootstrap of one number."""
     return np.random.default_rng(SEED)
 
 
 def show(found: Interval, form: str = ".2f", unit: str = "") -> str:
-    """A text such as ``0.48 [0.45, 0.52] m``. Few seeds have no brackets; the minus is a hyphen, for programs."""
+    """A text such as ``0.48 [0.45, 0.52] m``; without an interval, no brackets. Minus signs are ASCII, for programs."""
     between = "" if np.isnan(found.low) else f" [{found.low:{form}}, {found.high:{form}}]"
     return f"{found.value:{form}}{between}{f' {unit}' if unit else ''}"
 
@@ -47,9 +47,9 @@ def metres(found: Interval, form: str = "+.4f") -> str:
 
 
 def interquartile_mean(values: Array) -> Array:
-    """Mean of the middle half of ``(..., n_seeds)`` values: a quarter, rounded down, is cut at either end.
+    """Mean of the middle half of ``(..., n_seeds)`` values: a quarter, rounded down, is left out at each end.
 
-    If there are 2 or 3 values, none is cut; of 10 values the middle 6 count.
+    Of 2 or 3 values, none is left out; of 10 values, the middle 6 count.
     """
     means: Array = stats.trim_mean(values, 0.25, axis=-1)
     return means
@@ -65,14 +65,14 @@ def interval(
     """Percentile bootstrap: the middle 95 % of the statistic over 9999 draws of seeds with replacement.
 
     The bootstrap is stratified: each sample draws its own seeds, as many as it has. If errors are normal, the interval
-    holds the true interquartile mean in 94 % of cases with 10 or 20 seeds. With 5 seeds it is too narrow: 90 %.
+    has the true interquartile mean in 94 % of cases with 10 or 20 seeds, and in only 90 % of cases with 5 seeds.
     If a sample has fewer than ``LEAST_SEEDS`` seeds, the result is a `point`.
 
     Args:
         statistic: function of arrays ``(..., n_seeds, *rest)``, one for each sample; it returns ``(...)``.
         samples: arrays ``(n_seeds, *rest)``.
         rng: stream of the bootstrap.
-        paired: whether all samples have the same seeds in the same order; if so, seeds are drawn jointly.
+        paired: whether all samples have the same seeds in the same order, so that seeds are drawn jointly.
         level: confidence level; see `holm`.
 
     Raises:
@@ -117,21 +117,22 @@ def iqm_interval(*strata: Array, rng: np.random.Generator, level: float = LEVEL)
 
 
 def point(value: float) -> Interval:
-    """An interval without ends, for too few seeds."""
+    """A number whose interval is unknown, for too few seeds."""
     return Interval(value, np.nan, np.nan)
 
 
 def over_seeds(values: Array) -> Interval | None:
-    """Interquartile mean of ``(n_seeds,)`` values; the interval needs ``LEAST_SEEDS``. None if a value is missing."""
+    """Interquartile mean of ``(n_seeds,)`` values with its interval; None if a value is missing."""
     if not len(values) or not np.isfinite(values).all():
         return None
     return point(float(values[0])) if len(values) == 1 else iqm_interval(values, rng=rng())
 
 
 def improvement(ours: Array, theirs: Array) -> Array:
-    """Probability of improvement: share of pairs of our ``(..., n)`` and their ``(..., m)`` errors where ours is less.
+    """Probability of improvement: share of the pairs (one of our errors, one of theirs) in which ours is smaller.
 
-    A tie counts half. This share is the Mann-Whitney statistic over n m; see Agarwal et al. (2021).
+    The errors are ``(..., n)`` and ``(..., m)``; a tie counts half. The share is the Mann-Whitney statistic divided by
+    n m; see Agarwal et al. (2021).
     """
     x, y = np.asarray(ours)[..., :, None], np.asarray(theirs)[..., None, :]
     shares: Array = np.mean((x < y) + 0.5 * (x == y), axis=(-2, -1))
@@ -141,10 +142,10 @@ def improvement(ours: Array, theirs: Array) -> Array:
 def improvement_interval(ours: Array, theirs: Array, *, level: float = LEVEL) -> Interval:
     """``improvement`` of ours ``(n,)`` over theirs ``(m,)``, with a score interval, which stays wide for few seeds.
 
-    Wilson's interval for this statistic holds all probabilities that the data do not reject (Newcombe 2006, Statistics
-    in Medicine 25:559, method 5). If all our errors lie below all of theirs, it is [.80, 1] with ten seeds and [.90, 1]
-    with twenty; a bootstrap would give [1, 1] even with two. If errors are normal, the interval holds the truth in 95
-    to 98 % of cases, with 5, 10 or 20 seeds. If a side has fewer than ``LEAST_SEEDS``, the result is a `point`.
+    Wilson's interval for this statistic has all probabilities that the data do not reject (Newcombe 2006, Statistics in
+    Medicine 25:559, method 5). If all our errors are smaller than all of theirs, the interval is [.80, 1] with 10 seeds
+    and [.90, 1] with 20; a bootstrap would give [1, 1] even with 2 seeds. If errors are normal, the interval has the
+    true value in 95 to 98 % of cases with 5, 10 or 20 seeds. With fewer than ``LEAST_SEEDS``, the result is a `point`.
 
     Raises:
         ValueError: a side has fewer than 2 seeds, or an error is not finite.
@@ -158,7 +159,7 @@ def improvement_interval(ours: Array, theirs: Array, *, level: float = LEVEL) ->
     z = float(stats.norm.isf((1 - level) / 2))
 
     def excess(p: float) -> float:
-        """Above 0 where p is rejected: squared distance to the statistic, minus z^2 times the variance under p."""
+        """Squared distance from p to the statistic, minus z^2 times the variance under p; above 0, p is rejected."""
         variance = p * (1 - p) * (1 + ((n + m) / 2 - 1) * ((1 - p) / (2 - p) + p / (1 + p))) / (n * m)
         return (found - p) ** 2 - z * z * variance
 
@@ -169,14 +170,14 @@ def improvement_interval(ours: Array, theirs: Array, *, level: float = LEVEL) ->
 
 
 def holm(claims: Iterable[Key], rejects: Callable[[Key, float], bool]) -> set[Key]:
-    """The claims that stand jointly: the probability that any of them is wrong is at most 5 %.
+    """The claims that are accepted jointly: the probability that any accepted claim is wrong is at most 5 %.
 
-    Holm's method (1979) by intervals: all claims are tested at Bonferroni's level for their number. Those that stand
+    Holm's method (1979) with intervals: all claims are tested at Bonferroni's level for their number. Accepted claims
     are set aside, and the remaining claims are tested again at the level for their own number.
 
     Args:
-        claims: all claims that were considered, even hopeless ones.
-        rejects: function of a claim and a level; true if an interval of this confidence decides the claim.
+        claims: all claims that were considered, also those without a chance.
+        rejects: function of a claim and a confidence level; true if the interval at this level decides the claim.
     """
     left = list(dict.fromkeys(claims))
     standing: set[Key] = set()
@@ -191,7 +192,7 @@ def holm(claims: Iterable[Key], rejects: Callable[[Key, float], bool]) -> set[Ke
 
 
 def common_differences(ours: Mapping[int, float], theirs: Mapping[int, float]) -> Array:
-    """``(n_seeds,)`` differences ours - theirs for the common seeds, in order; the motor noise of a seed cancels.
+    """``(n_seeds,)`` differences ours - theirs at common seeds, in order; effects of the seed on both sides cancel.
 
     Args:
         ours, theirs: errors (m) by seed.

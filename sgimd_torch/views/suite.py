@@ -1,14 +1,15 @@
 """Test a learner on many robots, against two references: random movements, and uniform goals.
 
-A uniform goal gets one movement: the nearest exemplar plus noise. Both references infer movements by the nearest
-neighbour. Options of sgimd run choose the learner; --vary, as in sgimd sweep, compares several learners. Each task has
-a table like that of sgimd table, in the unit of the task; its last column is the error minus the error of random
-movements. This library chose its defaults on half of the tasks; the other tasks are marked "new".
+The reference with uniform goals makes one movement for each goal, the nearest exemplar plus noise. In evaluations the
+nearest exemplar answers for both references. Options of sgimd run choose the learner; --vary, as in sgimd sweep,
+compares several learners. Each task has a table like that of sgimd table, in the unit of the task. The last column is
+the error minus the error of random movements. The defaults of this library were chosen on half of the tasks; the other
+tasks are marked "new".
 
   sgimd suite                                             the default learner on the tasks without physics
   sgimd suite --seeds 0-9 --movements 2000 --out study    runs go to study/TASK/NAME/seed-000
   sgimd suite --vary inverse=linear,process --seeds 0-4   compare two inverse models
-  sgimd suite --tasks all                                 also fishing rod and swimmer (extra gym), minutes a run
+  sgimd suite --tasks all                                 also fishing rod and swimmer (extra gym); a run takes minutes
   sgimd suite --tasks toss crawler --algorithm sagg-riac --budget 4
 
 Repeat the command after Ctrl-C or a power cut, or with more seeds: finished runs are kept.
@@ -36,8 +37,8 @@ class Suited:
 
     Args:
         options: options of a run that choose the task.
-        new: whether the task was never used to choose a default.
-        quick: whether the task needs no physics.
+        new: whether no default was chosen on the task.
+        quick: whether the task needs no physics simulation.
     """
 
     options: Mapping[str, Any] = field(default_factory=dict)
@@ -78,7 +79,7 @@ DEFAULTS: Final = {
     "out": "runs/suite",
 }
 OWN: Final = ("environment", "benchmark", "demonstrations", "name")  # options that a task decides
-SHARED: Final = ("movements", "evaluate_at", "evaluated_by", "repeats", "floor_at", "out")  # options of all
+SHARED: Final = ("movements", "evaluate_at", "evaluated_by", "repeats", "floor_at", "out")  # common to all runs
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -95,10 +96,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def runs_of(options: argparse.Namespace, rest: Sequence[str]) -> tuple[list[Config], list[str]]:
-    """All runs, task by task within a seed, and the flags of ``sgimd run``.
+    """Settings of all runs, seed by seed and then task by task, and the flags of ``sgimd run``.
 
     Args:
-        options: parsed ``tasks``, ``seeds`` and ``vary``.
+        options: parsed options, of which ``tasks``, ``seeds`` and ``vary`` are used.
         rest: options of ``sgimd run``.
 
     Raises:
@@ -142,7 +143,7 @@ def parser() -> argparse.ArgumentParser:
         default=["quick"],
         choices=[*TASKS, "quick", "all"],
         metavar="TASK",
-        help="names of tasks, or quick for all tasks without physics, or all (default: quick)",
+        help="names of tasks, or all, or quick for all tasks without physics (default: quick)",
     )
     add_vary(parser)
     add_options(parser, seeds="0")

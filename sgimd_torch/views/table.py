@@ -1,18 +1,19 @@
 """A table of the results of runs: error, noise floor and time of each variant, over its seeds.
 
 RUNS is a folder of variants (OUT), of one variant (OUT/NAME), or of one run (OUT/NAME/seed-000). Variants are compared
-after the last number of movements at which all finished runs were evaluated, or after --at. The worst variant comes
-first. Runs that were not evaluated after this number are left out, and named below the table.
+after --at movements; the default is the last number of movements at which all finished runs were evaluated. Runs
+without this evaluation are left out, and named below the table. The worst variant comes first.
 
-Errors and noise floors are means over seeds, in the unit of T. With 5 seeds or more, ± is their standard deviation.
-In the column "by linear" the inverse model LocallyLinear answers for all variants. Times are milliseconds per movement.
+Errors and noise floors are means over seeds, in the unit of T. With 5 seeds or more, the number after ± is the standard
+deviation of the errors over seeds. In the column "by linear" the inverse model LocallyLinear answers for all variants.
+Times are milliseconds per movement.
 
---baseline adds a column: the error minus the error of the baseline, as interquartile mean of the differences at common
-seeds. With 5 seeds or more, its 95 % bootstrap interval is in brackets. A number below 0 is better than the baseline.
+--baseline adds a column: the interquartile mean of the differences error minus error of the baseline, at common seeds.
+With 5 seeds or more, the brackets have its 95 % bootstrap interval. A number below 0 is better than the baseline.
 
   sgimd table runs
   sgimd table study --at 2000                      before all runs are finished
-  sgimd table study --baseline goals=interest-map  differences from one variant
+  sgimd table study --baseline goals=interest-map  with differences from this variant
 
 Exit code: 0 a table was printed, 2 there is nothing to show.
 """
@@ -84,7 +85,7 @@ def _last_common(runs: Sequence[Run]) -> int:
     """The largest number of movements at which all of these runs were evaluated; 0 without runs.
 
     Raises:
-        RunError: there is no such number.
+        RunError: no evaluation is common to all runs.
     """
     moments = [set(run.answers["own"]["movements"].tolist()) for run in runs]
     common = set.intersection(*moments) if moments else {0}

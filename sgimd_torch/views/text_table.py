@@ -13,7 +13,7 @@ from sgimd_torch.runs.process import printable
 def print_table(rows: Sequence[Sequence[str]]) -> None:
     """Print rows of equal length in aligned columns, two spaces apart.
 
-    Each row is flushed, because a reader such as ``head`` may close the pipe.
+    Each row is flushed, so that a reader such as ``head``, which closes the pipe, causes its error here.
     """
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:

@@ -1,4 +1,4 @@
-"""Variants of a study, their statistics over seeds, and their comparison: the numbers of tables and reports.
+"""Variants of a study: their statistics over seeds, and their comparison, for tables and reports.
 
 variants = best_first(Variant(name, runs) for name, runs in read(Path("study")).items())
 chosen = baseline_of(variants, "random"); [(row.variant.label, row.verdict) for row in compare(variants, chosen)]
@@ -22,12 +22,12 @@ from sgimd_torch.runs.read import Run, find_runs, read_run
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.statistics import LEAST_SEEDS, Interval, common_differences, over_seeds
 
-EARLY: Final = 1000  # number of movements at which tables show a first error
-USUAL: Final = "sgim-d"  # the default baseline
+EARLY: Final = 1000  # number of movements after which tables show an early error
+USUAL: Final = "sgim-d"  # name of the default baseline
 
 
 def read(place: Path) -> dict[str, list[Run]]:
-    """All runs below a folder, by variant, without their thetas.
+    """All runs below a folder, by name of the variant, without their thetas.
 
     Raises:
         RunError: there are no runs, or one is damaged.
@@ -35,18 +35,18 @@ def read(place: Path) -> dict[str, list[Run]]:
     runs: dict[str, list[Run]] = {}
     found = [(name, path) for name, paths in find_runs(place).items() for path in paths]
     for name, path in tqdm(found, "reading", unit="", delay=1.0, disable=None):
-        run = replace(read_run(path), thetas=np.empty((0, 0)))  # no view shows thetas
+        run = replace(read_run(path), thetas=np.empty((0, 0)))  # thetas need much memory, and no view shows them
         runs.setdefault(name, []).append(run)
     return runs
 
 
 def best_first(variants: Iterable[Variant]) -> list[Variant]:
-    """Variants in the order of their last errors; variants without an error come last."""
+    """Variants in the order of their last errors, the smallest first; variants without an error come last."""
     return sorted(variants, key=lambda v: (v.last_error.value if v.last_error else np.inf, v.name))
 
 
 def unit_of(variants: Sequence[Variant]) -> Callable[[str], str]:
-    """A function that names a quantity with the unit of T, if all variants have the same unit."""
+    """A function that adds the unit of T to the name of a quantity, or "unit of T" if units of variants differ."""
     first = variants[0].space
     same = all(variant.space.unit == first.unit for variant in variants)
     return first.in_unit if same else lambda quantity: f"{quantity} (unit of T)"
@@ -55,13 +55,13 @@ def unit_of(variants: Sequence[Variant]) -> Callable[[str], str]:
 class Variant:
     """The runs of one variant, one for each seed.
 
-    Errors are those of finished runs (of all evaluated runs if none is finished), at evaluations that all these have.
+    Statistics use the finished runs, or all evaluated runs if none is finished, at their common evaluations.
 
     Args:
         name: name of the variant's folder.
         runs: runs of the variant, at least one.
-        at: number of movements at which variants are compared; every run that was evaluated there counts. None for the
-            last common evaluation.
+        at: number of movements at which variants are compared; statistics then use all runs with an evaluation there.
+            None for the last common evaluation.
     """
 
     def __init__(self, name: str, runs: Sequence[Run], at: int | None = None) -> None:
@@ -79,7 +79,7 @@ class Variant:
         self.last = at or (int(self.evaluated[-1]) if len(self.evaluated) else 0)  # number of movements
 
     def values(self, movements: int, column: str = "mean_error", answer: str = "own") -> Array:
-        """``(n_seeds,)`` values of a column after so many movements; NaN if there is none."""
+        """``(n_seeds,)`` values of a column of the evaluations after ``movements`` movements; NaN: no evaluation."""
         return np.array([run.at(movements, column, answer) for run in self.used], dtype=np.float64)
 
     def at(self, movements: int, column: str = "mean_error", answer: str = "own") -> Interval | None:
@@ -109,7 +109,7 @@ class Variant:
 
     @cached_property
     def last_error(self) -> Interval | None:
-        """The error (m) at the last common evaluation."""
+        """The error (m) at the evaluation where variants are compared, ``last``."""
         return self.at(self.last)
 
     @cached_property
@@ -120,26 +120,26 @@ class Variant:
 
     @cached_property
     def demonstrated(self) -> Array:
-        """``(n, outcome_dim)`` m, outcomes of the demonstrations shown in its runs."""
+        """``(n, outcome_dim)`` m, outcomes of the demonstrations shown in all runs."""
         shown = [each.outcome for run in self.runs for each in run.demonstrations]
         return np.array(shown, dtype=np.float64).reshape(len(shown), self.landed.shape[1])
 
     @cached_property
     def misses(self) -> tuple[Array, Array]:
-        """Goals ``(n, outcome_dim)`` of the last evaluation, and ``(n,)`` errors, means over seeds with these goals."""
+        """Goals ``(n, outcome_dim)`` of the last evaluation, and their errors ``(n,)``, means over seeds."""
         goals = self.typical.benchmark
         errors = [run.missed_by(self.last)[0] for run in self.used if np.array_equal(run.benchmark, goals)]
         return goals, np.mean(errors, axis=0)
 
     @property
     def typical(self) -> Run:
-        """The run with the median last error, or the better one of two in the middle; maps of one run show it."""
+        """The run with the median last error, or the better of two such runs; figures of a single run show it."""
         if not self.last:
             return max(self.runs, key=lambda run: len(run.index))
         return sorted(self.used, key=lambda run: run.at(self.last))[(len(self.used) - 1) // 2]
 
     def seconds(self, part: str) -> float:
-        """Seconds spent on a part, "physics", "learner" or "evaluation": the mean over runs."""
+        """Mean over runs of the seconds spent on a ``part``: "physics", "learner" or "evaluation"."""
         return float(np.mean([run.summary[f"seconds_{part}"] for run in self.used or self.runs]))
 
     def _over_time(self, column: str) -> Array:
@@ -152,9 +152,9 @@ class Comparison:
     """The last error of a variant minus that of the baseline.
 
     Args:
-        variant: variant that is compared.
+        variant: variant that is compared with the baseline.
         seeds: ``(n_seeds,)`` m, differences at the common seeds.
-        found: interquartile mean of ``seeds`` (m) with its interval.
+        found: interquartile mean (m) of the differences, with its interval.
     """
 
     variant: Variant
@@ -163,7 +163,7 @@ class Comparison:
 
     @property
     def verdict(self) -> str:
-        """Words for the position of the interval relative to 0; if seeds are few, words that say so."""
+        """Verdict by the position of the interval relative to 0, or a text that there are too few seeds."""
         if len(self.seeds) < LEAST_SEEDS:
             return f"fewer than {LEAST_SEEDS} common seeds"
         return "better" if self.found.high < 0 else "worse" if self.found.low > 0 else "not told apart"
@@ -184,7 +184,7 @@ def baseline_of(variants: Sequence[Variant], name: str | None = None) -> Variant
 
 
 def compare(variants: Sequence[Variant], baseline: Variant | None) -> list[Comparison]:
-    """Comparisons with the baseline, of all variants that have common seeds and the same last number of movements."""
+    """Comparisons of variants with the baseline: those that share seeds and the last number of movements with it."""
     if baseline is None:
         return []
     theirs = _last_errors(baseline)

@@ -1,16 +1,16 @@
-"""What the tests of boards share: the event file of a run, as TensorBoard's own reader has it."""
+"""Helpers for tests of boards: they read the event file of a run with TensorBoard's own reader."""
 
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 
 def board_of(directory):
-    """What the only event file of a run holds."""
+    """The content of the only event file of a run."""
     (path,) = directory.glob("events.out.tfevents.*")
     return EventAccumulator(str(path), size_guidance={"scalars": 0, "images": 0, "tensors": 0}).Reload()
 
 
 def curves_of(directory):
-    """By tag: {step: value}; a step that is there twice fails."""
+    """The values {step: value} of each tag; fails if a tag has a step twice."""
     board, found = board_of(directory), {}
     for tag in board.Tags()["scalars"]:
         points = board.Scalars(tag)
@@ -20,7 +20,7 @@ def curves_of(directory):
 
 
 def pictures_of(directory):
-    """By tag: {step: png}."""
+    """The pictures {step: png} of each tag."""
     board = board_of(directory)
     return {
         tag: {image.step: image.encoded_image_string for image in board.Images(tag)} for tag in board.Tags()["images"]

@@ -6,13 +6,13 @@ from pathlib import Path
 import pytest
 
 CHROMIUM = next((path for path in map(Path, ("/usr/bin/chromium", "/usr/bin/chromium-browser")) if path.exists()), None)
-# Without the first one there is no WebGL, and so no picture; the second is for machines where tests run as root.
+# The first flag gives WebGL without a GPU; the second is needed where tests run as root.
 FLAGS = ["--enable-unsafe-swiftshader", "--no-sandbox"]
 
 
 @contextmanager
 def chromium():
-    """A browser; the test is skipped, with a word, where there is none."""
+    """A browser; if none is installed, the test is skipped with a message."""
     api = pytest.importorskip("playwright.sync_api", reason="needs playwright, which is not installed")
     if CHROMIUM is None:
         pytest.skip("needs Chromium at /usr/bin/chromium, which is not there")

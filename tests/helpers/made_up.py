@@ -1,4 +1,4 @@
-"""Made-up rows in which every claim is true, to be spoilt by the tests."""
+"""Made-up tables of results in which every claim is true; tests change rows to make claims false."""
 
 import numpy as np
 import pandas as pd
@@ -9,7 +9,7 @@ from variants import EXPERIMENTS, FOUR, SPARSE, SUITE
 
 MOVEMENTS = (*TIMES, 3000, 4000, 5000)
 SEEDS = 20
-LETTER = {  # error at 5000 (m) of the paper's learners; those of its letter have the same, by eq. (9)
+LETTER = {  # errors (m) after 5000 movements; learners by the letter of the paper have equal errors
     "sagg-riac": 0.15,
     "observation": 0.25,
     "imitation": 0.15,
@@ -26,14 +26,14 @@ ON_TASKS = {"practice-uniform": 1.0, "random-nearest": 2.0, "uniform-nearest": 1
 
 
 def lettered(name):
-    """The name of a learner of the paper as it is to the letter."""
+    """The name of a learner by the letter of the paper, for the name of our learner."""
     for ending in ("-teacher-1", "-teacher-2", "-large"):
         if name.endswith(ending):
             return f"{name.removesuffix(ending)}-letter{ending} by paper"
     return f"{name}-letter by paper"
 
 
-ERRORS = {  # name, as `Evidence` has it: its error (m) at 5000
+ERRORS = {  # errors (m) after 5000 movements by name, as in `Evidence`
     "random": 0.20,
     **LETTER,
     **{lettered(name): error for name, error in LETTER.items()},
@@ -87,12 +87,12 @@ EXPLORED = {"random": (100, 0, 0), "sagg-riac": (200, 500, 1), "sgim-d": (300, 4
 
 
 def spread(name, seed):
-    """How seeds differ: by up to 2 %, those of SAGG-RIAC by up to 6 %."""
+    """Factor of the error of a seed; it differs from 1 by up to 2 %, for SAGG-RIAC by up to 6 %."""
     return 1 + (0.06 if name.startswith("sagg-riac") else 0.02) * (seed - (SEEDS - 1) / 2) / SEEDS
 
 
 def error(name, seed, movements, last=None):
-    """Falls as 1 / movements to ``last``, that of ERRORS, at 5000."""
+    """Error (m), which falls as 1 / movements to ``last`` at 5000 movements; the default of ``last`` is in ERRORS."""
     return (ERRORS[name] if last is None else last) * spread(name, seed) * (0.8 + 0.2 * 5000 / movements)
 
 
@@ -103,7 +103,7 @@ def row(experiment, variant, seed, movements, answer, error, floor=None, task="f
 
 
 def write(folder, rows, name=FILE):
-    """A table of these rows; returns the folder."""
+    """Write a table of these rows, and return its folder."""
     folder.mkdir(parents=True, exist_ok=True)
     columns = TABLES[name][1]
     write_table(folder, name, pd.DataFrame([*rows], columns=[*columns]))
@@ -111,8 +111,11 @@ def write(folder, rows, name=FILE):
 
 
 def write_rows(folder, spoilt=None, without=(), floor=0.98, asked=None, explored=None):
-    """All tables. ``spoilt``: name to a factor of its errors, or to one for each number of movements; ``without`` these
-    names; ``floor``: over the error; ``asked``, ``explored``: other counts by variant."""
+    """Write all tables.
+
+    ``spoilt`` has factors of errors by name, one factor or one for each number of movements. ``without`` has names to
+    leave out. ``floor`` is the noise floor divided by the error. ``asked`` and ``explored`` replace counts by variant.
+    """
     rows = []
     for name in (name for name in ERRORS if name not in without):
         factors = (spoilt or {}).get(name, 1.0)

@@ -1,4 +1,4 @@
-"""What the tests of the forward model share: problems over given exemplars, and a model that was taught before."""
+"""Helpers for tests of the forward model: problems with given exemplars, and with a trained model."""
 
 import numpy as np
 
@@ -14,12 +14,12 @@ ARM = PlanarArm(7)
 
 
 def boxes(policies: Box, noise: float = 0.0) -> Boxes:
-    """A robot of which only Pi and the noise matter; its T is wide."""
+    """A robot without contexts, with given Pi and noise, and with a T that contains all outcomes."""
     return Boxes(Box.cube(0.0, 1.0, 0), policies, Box.cube(-1e4, 1e4, 2), np.zeros(2), noise)
 
 
 def problem_of(memory, model=None, *, environment=ARM, seed=0, inverse=LocallyLinear, trust=TRUSTED_UP_TO):
-    """A problem with these exemplars; if there is a ``model``, its parts share one that has learnt the same."""
+    """A problem with the exemplars of ``memory``; its parts share a copy of the trained ``model``, if one is given."""
     problem = Problem(environment, seed, memory, inverse=inverse)
     if model is not None:
         model_of(problem, trust=trust).load_state_dict(model.state_dict())

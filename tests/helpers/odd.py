@@ -1,4 +1,4 @@
-"""A robot of a user's own that stops itself, or others, in the middle of a run: no test has to wait for that."""
+"""A user's robot that kills its own process, or stops the sweep, in the middle of a run. So tests need no timing."""
 
 import os
 import subprocess
@@ -6,7 +6,7 @@ import sys
 
 from runs import ROOT, content_of
 
-# An arm that does, before its 20th movement, what the variable AT_20 says.
+# Before its 20th movement, the arm does what the environment variable AT_20 names, a key of WAYS.
 ROBOT = """
 import os, signal
 import numpy as np
@@ -44,7 +44,7 @@ SWEEP = "import sys; from sgimd_torch.runs import process, sweep; sys.exit(proce
 
 
 def odd_place(place):
-    """``place`` with the module of the robot, and in ``alone`` its runs of seeds 0 and 1 when it does nothing odd."""
+    """Write the module of the robot to ``place``, and undisturbed runs of seeds 0 and 1 to its folder ``alone``."""
     (place / "odd.py").write_text(ROBOT)
     words = [sys.executable, "-c", SWEEP, *ODD, "--seeds", "0-1", "--out", "alone"]
     subprocess.run(words, cwd=place, env={**os.environ, "PYTHONPATH": str(ROOT)}, check=True, capture_output=True)
@@ -52,13 +52,13 @@ def odd_place(place):
 
 
 def as_alone(place, out, seeds):
-    """Whether the runs in ``out`` are those in ``alone``."""
+    """Whether the runs in ``out`` equal the undisturbed runs in ``alone``."""
     places = [f"random/seed-{seed:03d}" for seed in seeds]
     return [content_of(out / each) for each in places] == [content_of(place / "alone" / each) for each in places]
 
 
 def said_by(process, code):
-    """What a process says until it ends with this code."""
+    """The error output of a process, which must end with this exit code and without a traceback."""
     _, said = process.communicate()
     assert process.returncode == code, said
     assert "Traceback" not in said

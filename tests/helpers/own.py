@@ -1,4 +1,4 @@
-"""Environments that a user might bring, as a module in the working directory: outcomes of any dimension, a context."""
+"""A module with environments of a user: outcomes of 1 to 3 dimensions, a context, and pictures with faults."""
 
 MODULE = '''
 import numpy as np
@@ -6,7 +6,7 @@ from sgimd_torch import Box
 from sgimd_torch.environments.protocol import Sketch, check_movement
 
 class Slider:
-    """theta: where it slides to, each in [0, 1]; a context, if there is one, shifts it."""
+    """A slider: theta in [0, 1] is its place in each dimension, which a context, if there is one, shifts."""
     dim, context_dim = 1, 0
     outcome_noise = 0.01
 

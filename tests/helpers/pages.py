@@ -1,4 +1,4 @@
-"""What the tests of reports share: a page taken apart."""
+"""Helpers for tests of reports: a parser of pages."""
 
 import html
 import re
@@ -8,7 +8,7 @@ from markupsafe import escape
 
 
 class Page(HTMLParser):
-    """The elements with their attributes, and the text of headings, cells and code; refuses unclosed ones."""
+    """The elements of a page with their attributes, and its texts by element; fails if an element is not closed."""
 
     def __init__(self, text):
         super().__init__()
@@ -34,7 +34,7 @@ class Page(HTMLParser):
 
 
 def rows_of(text, caption):
-    """The cells of the first table whose caption begins so, head first."""
+    """Rows of cells, the head first, of the first table whose caption begins with ``caption``."""
     table = text[text.index(f'<p class="soft">{escape(caption)}') :]
     table = table[table.index("<tr>") : table.index("</tbody>")]
     cells = [re.findall("<t[hd][^>]*>(.*?)</t[hd]>", row, re.DOTALL) for row in table.split("</tr>")[:-1]]

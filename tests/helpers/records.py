@@ -1,4 +1,4 @@
-"""What the tests of records share: events, and a small record with rows in every table, which no learner has lived."""
+"""Helpers for tests of records: events, and a small made-up record with rows in every table."""
 
 import numpy as np
 
@@ -20,7 +20,7 @@ def shown(k=0.0, n_joints=2):
 
 
 def fill(path, seed=0, n=40):
-    """A record with rows in all tables."""
+    """Write a record with rows in all tables, and return its path."""
     rng = stream(seed, "record")
     with Record.make(path, DIMS, {"settings": {"seed": seed, "movements": n}, "versions": {"numpy": "2"}}) as record:
         for k in range(n):
@@ -41,6 +41,6 @@ def rows_for(table, rng, n=12):
 
 
 def read(path):
-    """All that a record says."""
+    """The rows of all tables of a record, by table."""
     with Record(path) as record:
         return {table: list(record.rows(table)) for table in layout(record.dims)}

@@ -1,4 +1,4 @@
-"""What the tests of runs share: how a run is started, stopped at a movement or edited, and what it has recorded."""
+"""Helpers for tests of runs: they start runs, stop them at a movement, edit records, and read them."""
 
 import os
 import shlex
@@ -17,7 +17,7 @@ ROOT = Path(sgimd_torch.__file__).parents[1]
 MOVEMENTS = 90
 RUN = "import sys; from sgimd_torch.runs import command_line, process"
 LIVE = f"{RUN}; sys.exit(process.command(command_line.main, sys.argv[1:]))"
-# It stops itself once movement {0} is done; every movement is brought to the disk at once.
+# A run that stops its own process after {0} movements; every movement is written to the disk at once.
 STOPS = f"""
 import os, signal
 from sgimd_torch.runs import run
@@ -36,26 +36,26 @@ def arguments(out, benchmark):
 
 
 def content_of(directory):
-    """The rows of all tables but ``about``, which has seconds and versions."""
+    """The rows of all tables except ``about``, which differs from run to run."""
     with Record(directory / FILE) as record:
         return {table: list(record.rows(table)) for table in layout(record.dims) if table != "about"}
 
 
 def about_of(directory):
-    """What made the run."""
+    """The table ``about`` of a run: its settings, versions and times."""
     with Record(directory / FILE) as record:
         return record.about
 
 
 def settle(directory, **about):
-    """Write down something else about what made the run."""
+    """Replace entries of the table ``about`` of a run."""
     with Record(directory / FILE, write=True) as record:
         record.settle(**about)
         record.commit()
 
 
 def edit(path, *statements):
-    """Change a record behind its back, by SQL."""
+    """Change the file of a record by SQL, without new seals."""
     with closing(sqlite3.connect(path)) as connection, connection:
         for statement in statements:
             connection.execute(statement)
@@ -66,7 +66,7 @@ def files_of(directory):
 
 
 def start(program, *options, limit=""):
-    """Another process; ``limit`` is for ``ulimit``."""
+    """Start a program in another process; ``limit`` are options of ``ulimit``."""
     paths = [str(ROOT), os.environ.get("PYTHONPATH", "")]
     command = shlex.join([sys.executable, "-c", program, *map(str, options)])
     return subprocess.Popen(
@@ -79,7 +79,7 @@ def start(program, *options, limit=""):
 
 
 def stopped(program, *options):
-    """Another process, once it has stopped itself."""
+    """Start a program in another process, and return this process when it has stopped itself."""
     process = start(program, *options)
     _, status = os.waitpid(process.pid, os.WUNTRACED)
     assert os.WIFSTOPPED(status), process.communicate()
@@ -87,12 +87,12 @@ def stopped(program, *options):
 
 
 def stopped_at(movements, *options):
-    """``sgimd run``, stopped after so many movements."""
+    """A process of ``sgimd run`` that has stopped itself after ``movements`` movements."""
     return stopped(STOPS.format(movements), *options)
 
 
 def end(process, signum=signal.SIGKILL):
-    """Send a stopped process a signal and let it go on; returns (exit code, stderr)."""
+    """Send a signal to a stopped process and continue the process; returns (exit code, stderr)."""
     process.send_signal(signum)
     process.send_signal(signal.SIGCONT)
     _, errors = process.communicate()

@@ -1,4 +1,4 @@
-"""What the tests of the learning side share: problems, a planar arm, demonstrations on it, and the paper's learners."""
+"""Helpers for tests of learning: problems, a planar arm, demonstrations for this arm, and the paper's learners."""
 
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ NO_CONTEXT = np.zeros(0)
 
 @dataclass
 class Boxes:
-    """The smallest environment: an outcome is the movement itself, cut or repeated to the dimensions of T."""
+    """The smallest environment: an outcome is theta itself, cut or repeated to the dimensions of T."""
 
     contexts: Box
     policies: Box
@@ -49,10 +49,10 @@ def problem(
     inverse: Callable[[Problem], Inverse] = NearestNeighbour,
     seed: int = 0,
 ) -> Problem:
-    """The problem of an environment; without one, of these boxes.
+    """The problem of an environment; without an environment, of `Boxes` with the given boxes.
 
-    Boxes that are not given have the dimensions of ``memory``: none for C, [0, 1] for Pi, [-1, 1]^2 for T. ``rest`` is
-    0, or the point of T nearest to it. The problem keeps ``memory`` itself, so that a test can add to it.
+    Missing boxes are [0, 1] for C and Pi and [-1, 1] for T, with the dimensions of ``memory``, or else 0, 1 and 2. The
+    default of ``rest`` is the point of T nearest to 0. The problem keeps ``memory`` itself: a test can add exemplars.
     """
     if environment is None:
         c, p, t = (0, 1, 2) if memory is None else (memory.context_dim, memory.theta_dim, memory.outcome_dim)
@@ -67,12 +67,12 @@ def problem(
 
 
 def last_posture(times: Array, trajectory: Array) -> Array:
-    """The correspondence of an arm whose outcome is where it ends: theta_d is the last posture of the recording."""
+    """The correspondence of a planar arm: theta_d is the last posture of the recording."""
     return trajectory[-1]
 
 
 def demonstrate(arm: PlanarArm, goal: Sequence[float] | Array, context: Array = NO_CONTEXT) -> Demonstration:
-    """The arm led from its middle posture to where it reaches ``goal``."""
+    """A demonstration of an arm that is led from its middle posture to a posture that reaches ``goal``."""
     theta = arm.solve(context, goal)
     times = np.linspace(0, 1, 5)
     trajectory = 0.5 + np.outer(times, theta - 0.5)
@@ -80,7 +80,7 @@ def demonstrate(arm: PlanarArm, goal: Sequence[float] | Array, context: Array = 
 
 
 def demonstrations(arm: PlanarArm, n: int = 20, seed: int = 0) -> list[Demonstration]:
-    """``n`` of them in the directions of a whole turn, all within reach."""
+    """``n`` demonstrations at random places within reach, in all directions."""
     rng = stream(seed, "demonstrations")
     radii = np.sqrt(rng.uniform(0.1, 0.9, n))
     turns = rng.uniform(-np.pi, np.pi, n)
@@ -89,7 +89,7 @@ def demonstrations(arm: PlanarArm, n: int = 20, seed: int = 0) -> list[Demonstra
 
 
 def part(kind: str, word: str) -> Callable[..., Any]:
-    """Constructor of the part that a word names; without its extra the test is skipped."""
+    """Constructor of a part by its name in the catalogue; if an extra is missing, the test is skipped."""
     try:
         return load_word(kind, word)
     except ValueError as error:
@@ -103,7 +103,7 @@ Sent = TypeVar("Sent")
 
 
 def drive(search: Generator[Array, Sent, None], execute: Callable[[Array], Sent], n: int = 10_000) -> list[Array]:
-    """The first ``n`` thetas that a search executes."""
+    """The thetas that a search proposes, at most ``n``."""
     thetas: list[Array] = []
     try:
         theta = next(search)
@@ -116,7 +116,7 @@ def drive(search: Generator[Array, Sent, None], execute: Callable[[Array], Sent]
 
 
 class World:
-    """Linear outcomes of unit-cube movements, and an estimate from ``k`` neighbours ``spread`` around a centre."""
+    """A linear world: theta in the unit cube, and a start estimate with ``k`` exemplars at most ``spread`` from it."""
 
     def __init__(self, dim: int, k: int, *, spread: float = 0.1, centre: Array | None = None, seed: int = 0) -> None:
         rng = stream(seed, "world")
@@ -144,7 +144,7 @@ class World:
 
 
 def remember(thetas: Array, outcomes: Array, contexts: Array | None = None) -> Memory:
-    """A memory of these exemplars, one a row."""
+    """A memory with these exemplars, one in each row."""
     contexts = np.zeros((len(thetas), 0)) if contexts is None else contexts
     memory = Memory(contexts.shape[1], thetas.shape[1], outcomes.shape[1])
     for exemplar in zip(contexts, thetas, outcomes, strict=True):
@@ -153,7 +153,7 @@ def remember(thetas: Array, outcomes: Array, contexts: Array | None = None) -> M
 
 
 def executed(arm: PlanarArm, thetas: Array) -> Memory:
-    """A memory of them, each in a context that was observed."""
+    """A memory of the arm's movements ``thetas``, each executed in an observed context."""
     rng, memory = stream(0, "exemplars"), Memory(arm.contexts.dim, arm.policies.dim, arm.outcomes.dim)
     for theta in thetas:
         context = arm.observe(rng)
@@ -172,5 +172,5 @@ TAUGHT = {"observation", "imitation", "sgim-d"}
 
 
 def make(name: str, arm: PlanarArm, seed: int = 0) -> Learner:
-    """One of the five learners."""
+    """One of the paper's five learners."""
     return ALGORITHMS[name](arm, seed)

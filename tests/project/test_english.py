@@ -1,6 +1,6 @@
-"""Plain English: a description makes sense alone, and one word has one meaning (the table is in CONTRIBUTING.md).
+"""Plain English: a description makes sense alone, and one word has one meaning (see the table in CONTRIBUTING.md).
 
-``pytest tests/project/test_english.py -k environments`` tests one place, a folder or a file beside the folders.
+``pytest tests/project/test_english.py -k environments`` tests one place: a folder, or a file in no folder.
 """
 
 import ast
@@ -13,14 +13,14 @@ import pytest
 from sgimd_torch.catalogue import WORDS, about
 
 ROOT = Path(__file__).parents[2]
-# First words that continue an earlier text, such as the name of the parameter; _ stands for a space.
+# First words of a description that only continues the name before it; _ stands for a space.
 CONTINUING = """
     the_same that which what who whom whose whoever whatever why when where how as such see also
     all_of all_that one_of one_or both_of it its they their them his those these this others about
     from by for to of in on at with without beyond below above between within under over after before during until
     since through into onto around against among like relative_to eq. default (default
 """
-# First words that make the parameter the subject of a sentence, participles, and units that lack their noun.
+# First words of a description without a noun: verbs of which the parameter is the subject, participles, and units.
 VERBS = """
     is are was were has have had does did may can must called drawn made given shown told asked used executed freshly
     draws gives decides refines keeps makes moves_a predicts replaces shows showed says serves asks tells wants goes
@@ -31,7 +31,7 @@ RELATIVE = "which|that|who|whose|where|when|what|how|if|as|whether"
 SENTENCE = rf"(?:(?!\b(?:{RELATIVE})\b)[^,;.:])*?\b(?:is|are)\b"  # "a region with more goals is cut in two"
 THE_SAME = r"(?:.*[,;:.(] )?(?:and )?the same(?=[,;:.]|$| (?:in|with|along|as|where|but|by|for|if|from)\b)"  # no noun
 QUAINT = re.compile(r"\b(?:lest|for want of|foretold|is no matter of|who has no|whom it)\b", re.IGNORECASE)
-# Names of parameters and of functions that mean something else elsewhere: what to write instead.
+# Names of parameters and functions that mean something else elsewhere, and names to write instead.
 AMBIGUOUS = {"measure": "performance or interest", "def record": "trajectory, film or play"}
 
 
@@ -57,7 +57,7 @@ def descriptions(tree: ast.AST):
 
 
 def helps(tree: ast.AST):
-    """What a command prints about its options, ``help="..."``; of an f-string its beginning."""
+    """Help texts of options, ``help="..."``; of an f-string only its first part."""
     for node in ast.walk(tree):
         if isinstance(node, ast.keyword) and node.arg in ("help", "about"):
             value = node.value.values[0] if isinstance(node.value, ast.JoinedStr) else node.value

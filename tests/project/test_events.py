@@ -1,4 +1,4 @@
-"""One writer of events, and what learning loads: no database, and few lines of ours."""
+"""Only the learner makes events; and learning loads no database, and few lines of this library."""
 
 import ast
 import subprocess
@@ -10,7 +10,7 @@ import pytest
 import sgimd_torch
 
 PACKAGE = Path(sgimd_torch.__path__[0])
-WRITERS = {"learner/__init__.py", "record/layout.py"}  # what happens; what had happened, read from a row
+WRITERS = {"learner/__init__.py", "record/layout.py"}  # the learner makes events; the record reads events from rows
 LEARNING = """
 from sgimd_torch import PlanarArm, practice, run
 arm = PlanarArm(7)
@@ -31,7 +31,7 @@ print("sqlite3" in sys.modules, *files, sep="|")
 
 
 def loaded_by(program, folder):
-    """Whether SQLite was loaded by a program that ran in ``folder``, and how many lines of each file of ours."""
+    """Whether a program loads SQLite, and the number of lines of each file of this library that the program loads."""
     words = [sys.executable, "-c", program + SAYS]
     said = subprocess.run(words, capture_output=True, text=True, check=True, cwd=folder).stdout
     sqlite, *files = said.splitlines()[-1].split("|")

@@ -1,4 +1,4 @@
-"""Contracts between parts: what each kind is given and can do stands in one file, and nothing is found by its name."""
+"""Contracts between parts: one file says what each kind of part gets and can do; no code looks up members by name."""
 
 import ast
 import inspect
@@ -32,13 +32,13 @@ LEARNING = (
     *("rivals", "teachers", "forward_model", "competence", "evaluation", "runs/build", "runs/run"),
 )
 BY_NAME = {"getattr", "hasattr", "attrgetter"}
-FIELDS = {  # file and definition that go through the fields of a class: why
+FIELDS = {  # files and definitions that may look up members by name, because they handle all fields of a class; why
     ("goals/regions", "Region"): "hands out its own arrays read-only",
     ("record/replay", "_check_lesson"): "compares two demonstrations field by field",
     ("forward_model/model", "ForwardModel"): "compares its sizes with those of a memory",
 }
 SIGNATURES = {"signature", "Signature", "getfullargspec", "parameters_of", "__code__", "__defaults__", "__kwdefaults__"}
-OPTIONS = {  # file and definition that read the parameters of a function: why
+OPTIONS = {  # files and definitions that may read the parameters of a function; why
     ("catalogue/options", None): "the signature is the option",
     ("runs/config", None): "options of the parts that a run has chosen",
     ("catalogue/__init__", "called"): "refuses what a user's own function does not take",
@@ -46,7 +46,7 @@ OPTIONS = {  # file and definition that read the parameters of a function: why
 
 
 def uses(names: set[str], package: Path) -> set[tuple[str, str | None]]:
-    """Files and their definitions that use one of these names; None for a file outside its definitions."""
+    """Pairs (file, definition) that use one of these names; the definition is None for code outside definitions."""
     found = set()
     for path in sorted(package.rglob("*.py")):
         place = path.relative_to(package).with_suffix("").as_posix()
@@ -103,21 +103,21 @@ def test_an_inverse_model_is_added_by_whoever_has_read_the_base_classes_and_one_
 
 
 class Halfway(Goals):
-    """Goals that are never told how it went."""
+    """Goals without a method ``add``."""
 
     def sample(self, context):
         return context
 
 
 class Unasked(UniformGoals):
-    """Goals that take no problem."""
+    """Goals whose constructor takes no problem."""
 
     def __init__(self):
         pass
 
 
 class Alien:
-    """What could be goals but is not."""
+    """A class that does not derive from Goals."""
 
     def __init__(self, problem):
         pass

@@ -1,4 +1,4 @@
-"""Versions: what scripts/setup installs is pinned, nothing else is, and the lowest versions allowed work as well."""
+"""Versions: scripts/setup installs exactly the pinned packages, and the lowest allowed versions work, too."""
 
 import importlib.metadata
 import os
@@ -21,7 +21,7 @@ PINNED = dict(
 
 
 def required(*names):
-    """Requirements of the project itself and of some of its extras; those that name the project are followed."""
+    """Requirements of the project with some of its extras; an extra that contains other extras is resolved."""
     lists = [PROJECT["project"]["dependencies"], *(EXTRAS[name] for name in names)]
     requirements = [Requirement(text) for each in lists for text in each]
     again = {extra for each in requirements if each.name == PROJECT["project"]["name"] for extra in each.extras}
@@ -31,7 +31,7 @@ def required(*names):
 
 
 def closure(requirements):
-    """Names of everything that these and their requirements bring on this system, as installed."""
+    """Names of all packages that these requirements install on this system, directly or indirectly."""
     wanted = [(each, extra) for each in requirements for extra in (each.extras or {""}) | {""}]
     done = set()
     while wanted:
@@ -91,7 +91,7 @@ def test_the_demo_needs_no_more_than_its_setup_installs(tmp_path):
 
 
 def lowest(requirement):
-    """``name==version`` of the lowest version that it allows."""
+    """A requirement ``name==version`` of the lowest version that ``requirement`` allows."""
     ((version,),) = [[part.version for part in requirement.specifier if part.operator == ">="]]
     extras = f"[{','.join(sorted(requirement.extras))}]" if requirement.extras else ""
     return f"{requirement.name}{extras}=={version}"
@@ -99,7 +99,7 @@ def lowest(requirement):
 
 @pytest.mark.slow
 def test_the_lowest_versions_allowed_install_together_and_pass(tmp_path):
-    # Some 3 GB to download: the lowest torch comes with its libraries for GPUs. Tools of style are not among them.
+    # About 3 GB to download, as the lowest torch comes with its libraries for GPUs. Linters are not tested.
     wanted = [*required("all", "dev"), *(Requirement(text) for text in PROJECT["build-system"]["requires"])]
     pins = [lowest(each) for each in wanted if each.name not in ("mypy", "ruff", "pytest-xdist")]
     python = str(tmp_path / "venv/bin/python")
@@ -108,7 +108,7 @@ def test_the_lowest_versions_allowed_install_together_and_pass(tmp_path):
     done = subprocess.run(install, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     tests = [f"tests/{name}" for name in SMOKE]
-    # Old releases warn of what newer Pythons and numpys will no longer do.
+    # Old releases cause deprecation warnings in newer versions of Python and numpy.
     words = ["-m", "pytest", "-p", "no:cacheprovider", "-W", "ignore::DeprecationWarning", "-mnot slow", *tests]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     done = subprocess.run([python, *words], cwd=ROOT, env=environment, capture_output=True, text=True)

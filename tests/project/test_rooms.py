@@ -1,4 +1,4 @@
-"""A feature owns its room: whoever leaves it out deletes one folder and its lines of the table of words."""
+"""A feature owns its room: to leave a feature out, delete its folder and its lines of the catalogue."""
 
 import ast
 import os
@@ -21,7 +21,7 @@ def words_of(room):
 
 
 def without(room, folder):
-    """A copy of the package and its tests without a room: how many lines of the table went."""
+    """Copy package and tests to ``folder`` without a room; returns the number of lines deleted from the catalogue."""
     for name in ("sgimd_torch", "tests"):
         shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(ROOT / "pyproject.toml", folder)
@@ -68,7 +68,7 @@ def test_without_a_room_the_rest_imports_runs_and_passes_its_own_tests(room, tmp
     assert "30 movements, mean error" in go("-m", "sgimd_torch", "run", "--algorithm", "sgim-d", *short)
     go("-m", "sgimd_torch", "run", "--help")
 
-    telling = [word for word in words if len(word) > 4]  # "all" and "slow" stand everywhere
+    telling = [word for word in words if len(word) > 4]  # short names such as "all" and "slow" are in many files
 
     def concerns(path):
         text = path.read_text(encoding="utf-8")

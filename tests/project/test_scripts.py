@@ -1,4 +1,4 @@
-"""The scripts: what setup installs and when, what the robots that teach show; wrong options are refused."""
+"""The scripts: when setup installs, what demonstrators 1 and 2 show, and which options are refused."""
 
 import os
 import shlex
@@ -39,7 +39,7 @@ def go(script, options):
         (make_benchmark, "--out nowhere/benchmark.npz"),
         (make_demonstrations, "--n -3"),
         (make_demonstrations, "--n 11 --candidates 10"),
-        (make_demonstrations, "--n 10 --candidates 10"),  # not all of them land inside T
+        (make_demonstrations, "--n 10 --candidates 10"),  # some recordings land outside T
         (make_demonstrations, "--candidates 0"),
         (make_demonstrations, "--seed -1"),
         (make_demonstrations, "--out nowhere/demonstrations.npz"),
@@ -65,7 +65,7 @@ def test_what_makes_no_sense_is_refused_and_nothing_is_written(tmp_path, monkeyp
 
 
 def lived(algorithm, seed, movements):
-    """The memory of a learner of the library, without runs on disk."""
+    """The memory of a learner after its movements, without a run on disk."""
     rod, teacher = FishingRod(threads=1), PeriodicTeacher(load_demonstrations(), stream(seed, "teacher"))
     learner = {
         "random": lambda: random_exploration(rod, seed),
@@ -94,7 +94,7 @@ def test_the_benchmark_is_a_goal_in_each_tile_that_the_three_learners_reached(tm
 
 @pytest.fixture(scope="module")
 def pool():
-    """What two SAGG-RIAC learners remember after 30 movements each, as far as it lies in T."""
+    """The exemplars with outcomes in T of two SAGG-RIAC learners after 30 movements each."""
     memories = [lived("sagg-riac", seed, 30) for seed in (4000, 4001)]
     thetas, outcomes = (np.concatenate([getattr(each, name) for each in memories]) for name in ("thetas", "outcomes"))
     inside = FishingRod().outcomes.contains(outcomes)
@@ -103,7 +103,7 @@ def pool():
 
 @pytest.fixture(scope="module")
 def teachers(tmp_path_factory):
-    """Demonstrators 1 and 2, taught by those lives."""
+    """Demonstrations of demonstrators 1 and 2, made from the learners of ``pool``."""
     out = tmp_path_factory.mktemp("teachers")
     go(make_teachers, f"--out {out} --n 5 --runs 2 --movements 30 --processes 1")
     assert sorted(path.name for path in out.iterdir()) == ["demonstrator_1.npz", "demonstrator_2.npz"]
@@ -111,7 +111,7 @@ def teachers(tmp_path_factory):
 
 
 def rows_of(demonstrations, thetas):
-    """Rows of the pool whose thetas the recordings give back, by the learner's own correspondence."""
+    """Rows of ``thetas`` that the recordings show, found by the correspondence of the learner."""
     primitive = FishingRod().primitive
     found = np.stack([primitive.correspondence(shown.times, shown.trajectory) for shown in demonstrations])
     distances = np.abs(found[:, None] - thetas).max(axis=2)
@@ -133,7 +133,7 @@ def test_the_careful_demonstrator_shows_one_movement_of_a_tile(pool, teachers):
     assert sorted(np.concatenate(tiles)) == list(range(len(outcomes)))
     chosen = [next(k for k, tile in enumerate(tiles) if row in tile) for row in rows]
     assert len(set(chosen)) == 5
-    assert np.ptp(outcomes[rows], axis=0).min() > 0.5 * np.ptp(outcomes, axis=0).min()  # over all that was reached
+    assert np.ptp(outcomes[rows], axis=0).min() > 0.5 * np.ptp(outcomes, axis=0).min()  # spread over the reached places
 
 
 def test_of_several_movements_the_one_that_lands_most_alike_is_the_most_reliable():
@@ -158,7 +158,7 @@ def test_a_pool_on_too_few_tiles_is_refused(pool):
 
 
 INTERPRETER = """#!/usr/bin/env bash
-# A Python whose venv is one file, and whose pip takes a moment and notes what it was asked for.
+# A fake Python: its venv is one file, and its pip takes 0.3 s and notes its arguments.
 case "$1 $2" in
 "-m venv") rm -rf "$4" && mkdir -p "$4/bin" && cp "$0" "$4/bin/python" && echo "venv" >>"$NOTES" ;;
 "-m pip") sleep 0.3 && echo "${@: -3:1}" >>"$NOTES" && exit "${PIP_FAILS:-0}" ;;
@@ -169,7 +169,7 @@ esac
 
 @pytest.fixture
 def setup(tmp_path):
-    """Starts scripts/setup in a checkout of its own; what was installed by all of them so far."""
+    """A function that starts scripts/setup in a new checkout, and returns what has been installed there so far."""
     root, notes, python = tmp_path / "a checkout", tmp_path / "notes", tmp_path / "python"
     (root / "scripts").mkdir(parents=True)
     for name in ("scripts/setup", "pyproject.toml", "constraints.txt"):

@@ -1,6 +1,6 @@
-"""The import rules of the package, room by room: who may import whom, and which room may touch which library.
+"""The import rules of the package: which rooms may import a room, and which rooms may import a library.
 
-A room is a folder of the package, or a file beside them. A new file in a folder needs nothing here.
+A room is a folder of the package, or a file in no folder. A new file in a folder needs no change here.
 """
 
 import ast
@@ -13,7 +13,7 @@ import pytest
 import sgimd_torch
 
 PACKAGE = "sgimd_torch"
-ROWS = [  # a room imports only from the rows before its own
+ROWS = [  # a room imports only from rows above its own
     {"spaces", "files", "catalogue"},
     {"memory", "environments"},
     {"parts", "demonstrations"},
@@ -28,7 +28,7 @@ ROWS = [  # a room imports only from the rows before its own
     {"__main__"},
 ]
 ROW = {room: row for row, rooms in enumerate(ROWS) for room in rooms}
-LIBRARIES = {  # library: the only rooms that may import it; of a folder, where one file is enough, that file
+LIBRARIES = {  # rooms or single files that may import a library, by library
     "numpy": ROW.keys(),
     "scipy": ROW.keys() - {"spaces"},
     "lazy_loader": {"__init__"},
@@ -59,16 +59,16 @@ LIBRARIES = {  # library: the only rooms that may import it; of a folder, where 
     "gymnasium": {"environments/from_gymnasium", "environments/to_gymnasium"},
 }
 WORLDS = {"environments"}
-PROTOCOL = "environments.protocol"  # what works with every environment
+PROTOCOL = "environments.protocol"  # the part of ``environments`` that other rooms may import
 LEARNING = {
     *{"parts", "memory", "competence", "goals", "explore", "inverses", "searches", "strategies", "learner", "teachers"},
     *{"asking", "rivals", "forward_model"},
 }
-FREE = {"runs", "views", "teach", "__init__"}  # these put things together
+FREE = {"runs", "views", "teach", "__init__"}  # rooms that combine learning and environments
 
 
 def imports(source: str):
-    """Dotted names of what a module imports, names taken from a module included, wherever the import stands."""
+    """Dotted names of all imports in a source text, such as "spaces" and "spaces.Box", also inside functions."""
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
@@ -78,7 +78,7 @@ def imports(source: str):
 
 
 def breach(place: str, name: str) -> str | None:
-    """What is wrong with a file at ``place``, such as "goals/regions", importing a dotted name, or None."""
+    """Message if a file at ``place``, such as "goals/regions", may not import a dotted name; None if it may."""
     room, (top, *rest) = place.partition("/")[0], name.split(".")
     if top != PACKAGE:
         allowed = LIBRARIES.get(top, ())
@@ -88,15 +88,15 @@ def breach(place: str, name: str) -> str | None:
         )
     target = rest[0] if rest and rest[0] in ROW else "__init__"
     if target == "__init__":
-        return None if rest[:1] == ["__version__"] or not rest else f"{place} imports {name} through the front door"
+        return None if rest[:1] == ["__version__"] or not rest else f"{place} imports {name} from the package"
     if target != room and ROW[target] >= ROW[room]:
         return f"{place} (row {ROW[room]}) imports {name} (row {ROW[target]})"
     if (room in LEARNING and target in WORLDS and not name.startswith(f"{PACKAGE}.{PROTOCOL}")) or (
         room in WORLDS and target in LEARNING
     ):
-        return f"{place} imports {name}: learning and environments meet in spaces and in the protocol"
+        return f"{place} imports {name}: learning and environments share only spaces and the protocol"
     if target in WORLDS and room not in WORLDS | FREE and not name.startswith(f"{PACKAGE}.{PROTOCOL}"):
-        return f"{place} imports {name}: of an environment only the protocol may be known here"
+        return f"{place} imports {name}: of environments, only the protocol may be imported here"
     return None
 
 
@@ -113,7 +113,7 @@ def breaches(package: Path) -> list[str]:
 
 
 def arrows(package: Path) -> dict[str, set[str]]:
-    """File -> files of the package that it imports when it is loaded, by dotted names."""
+    """For each file, by its dotted name, the files of the package that it imports when it is loaded."""
     files = {
         path.relative_to(package.parent).with_suffix("").as_posix().replace("/", "."): path
         for path in package.rglob("*.py")
@@ -131,7 +131,7 @@ def arrows(package: Path) -> dict[str, set[str]]:
 
 
 def circle(graph: dict[str, set[str]]) -> list[str]:
-    """Files that import each other in a loop; none if there is no such loop."""
+    """Files that import each other in a circle; [] if there is no circle."""
     done, path = set(), []
 
     def visit(name):
@@ -174,10 +174,10 @@ def test_there_are_few_rooms_and_no_folder_is_crowded():
 @pytest.mark.parametrize(
     ("place", "statement"),
     [
-        ("spaces", "from sgimd_torch.memory import Memory"),  # upwards
+        ("spaces", "from sgimd_torch.memory import Memory"),  # in a row below
         ("memory", "from sgimd_torch import learner"),
-        ("learner", "from sgimd_torch import Memory"),  # through the front door
-        ("strategies", "def late():\n    import sgimd_torch.session"),  # hidden in a function
+        ("learner", "from sgimd_torch import Memory"),  # from the package
+        ("strategies", "def late():\n    import sgimd_torch.session"),  # inside a function
         ("strategies", "from sgimd_torch.environments.planar_arm import PlanarArm"),
         ("environments/fishing_rod", "from sgimd_torch.memory import Memory"),
         ("session", "from sgimd_torch.environments.fishing_rod import FishingRod"),
@@ -216,7 +216,7 @@ def test_an_allowed_import_is_not_reported(tmp_path, place, statement):
 
 
 def loaded_by(program: str) -> set[str]:
-    """Modules that are loaded after a program."""
+    """Names of the modules that are loaded at the end of a program."""
     words = [sys.executable, "-c", f"{program}; import sys; print(*sys.modules)"]
     return set(subprocess.run(words, capture_output=True, text=True, check=True).stdout.split())
 

@@ -1,4 +1,4 @@
-"""The package as users get it: built, installed into an empty environment away from the checkout, and put to work."""
+"""The package as users get it: built, installed into an empty environment outside the checkout, and used."""
 
 import os
 import subprocess
@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 import sgimd_torch as s
 from sgimd_torch import Episode, PlanarArm, evaluate, practice, run
 
-s.load_benchmark().check(s.FishingRod())  # the data lie in the wheel, too
+s.load_benchmark().check(s.FishingRod())  # the wheel contains the data
 print(s.__version__, len(s.load_demonstrations()))
 arm = PlanarArm()
 learner = practice(arm, 0)
@@ -40,7 +40,7 @@ print(len(episodes), error < 0.1, theta.shape)
 
 @pytest.fixture(scope="module")
 def built(tmp_path_factory):
-    """The folder of the source distribution and of the wheel, which is built from it as an installer would."""
+    """The folder with the source distribution, and with the wheel built from the source distribution."""
     place = tmp_path_factory.mktemp("dist")
     words = [sys.executable, "-m", "build", "--outdir", str(place), str(ROOT)]
     subprocess.run(words, check=True, capture_output=True, env=WITHOUT_CHECKOUT)
@@ -49,7 +49,7 @@ def built(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def installed(built, tmp_path_factory):
-    """The folder of commands of an environment with the wheel, its extra for reports, and mypy."""
+    """The folder of commands of an environment with the wheel, the extra ``report``, and mypy."""
     place = tmp_path_factory.mktemp("wheel")
     (wheel,) = built.glob("sgimd_torch-*.whl")
     venv.create(place / "env", with_pip=True)
@@ -62,7 +62,7 @@ def installed(built, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def sgimd(installed, tmp_path_factory):
-    """Runs the installed command in a folder of its own; returns exit code, stdout and stderr."""
+    """A function that runs the installed command in a new folder, and returns exit code, stdout and stderr."""
     away = tmp_path_factory.mktemp("away")
 
     def sgimd(*words):
@@ -116,7 +116,7 @@ def test_a_strict_program_of_a_user_runs_and_its_types_are_checked_against_ours(
     done = checked("-m", "mypy", "--strict", "user.py")
     assert done.returncode == 0, done.stdout
     done = checked("-m", "mypy", "--strict", "wrong.py")
-    assert 'incompatible type "str"; expected "int"' in done.stdout  # so our types were read
+    assert 'incompatible type "str"; expected "int"' in done.stdout  # mypy has read our types
 
 
 def test_the_source_distribution_has_what_builds_tests_and_explains_and_no_more(built):

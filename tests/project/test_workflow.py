@@ -1,4 +1,4 @@
-"""What a public host is told to do for every change: the checks of scripts/test, on the systems and Pythons we name."""
+"""The workflow for every change: the checks of scripts/test, on all supported systems and Pythons."""
 
 from pathlib import Path
 
@@ -14,7 +14,7 @@ def runs_of(job):
 
 def test_it_runs_the_checks_that_one_runs_by_hand():
     (step,) = [step for step in WORKFLOW["jobs"]["test"]["steps"] if step.get("run") == "scripts/test"]
-    assert step["env"] == {"PYTHON": "python"}  # the one that was set up
+    assert step["env"] == {"PYTHON": "python"}  # the Python that the workflow has set up
     matrix = WORKFLOW["jobs"]["test"]["strategy"]["matrix"]
     assert matrix["python"] == ["3.11", "3.12", "3.13"]
     assert {*matrix["system"], *(each["system"] for each in matrix["include"])} == {"ubuntu-latest", "macos-latest"}

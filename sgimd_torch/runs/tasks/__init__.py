@@ -1,6 +1,6 @@
-"""Task: an environment with benchmark goals, demonstrations and a correspondence for them.
+"""Tasks: a task is an environment with benchmark goals, demonstrations and a correspondence to translate them.
 
-The catalogue has the tasks of ``rods.py`` and ``robots.py``. A function of yours may return one, too:
+The catalogue has the tasks of ``rods.py`` and ``robots.py``. A function of your own can return a task:
     def make(): return Task(Toss(), benchmark=my_goals, demonstrations=Path("shown.npz"), correspondence=translate)
 """
 
@@ -20,9 +20,9 @@ from sgimd_torch.files import checksum
 from sgimd_torch.learner import Correspondence
 from sgimd_torch.spaces import Array, Demonstration
 
-MOST_GOALS: Final = 500  # largest number of goals made for a task without goals
-FASTER: Final = 3.0  # times are wrong if a recording is so many times faster than the shortest movement
-TOO_FAR: Final = 0.25  # fraction of a joint's range; if the misfit is larger, the robot cannot play the recording
+MOST_GOALS: Final = 500  # largest number of benchmark goals for a task that brings none
+FASTER: Final = 3.0  # ratio of durations, shortest movement to recording; a larger ratio means times in a wrong unit
+TOO_FAR: Final = 0.25  # share of a joint's range; a recording with a larger misfit is refused
 
 
 @runtime_checkable
@@ -30,7 +30,7 @@ class Drawn(Protocol):
     """An environment whose movements can be filmed (optional)."""
 
     def trace(self, context: Array, theta: Array, rng: np.random.Generator) -> Trace:
-        """The movement; its outcome equals that of ``execute`` with an equal stream."""
+        """The trajectory of a movement. Its outcome must equal that of ``execute`` with an equal random stream."""
         ...
 
 
@@ -39,7 +39,7 @@ class Translating(Protocol):
     """An environment that can translate demonstrations (optional)."""
 
     def correspondence(self, times: Array, trajectory: Array) -> Array:
-        """``(theta_dim,)`` theta_d, eq. (6); ``times (n_times,)`` in s, ``trajectory (n_times, n_joints)``."""
+        """theta_d ``(theta_dim,)``, eq. (6); ``times`` ``(n_times,)`` s, ``trajectory`` ``(n_times, n_joints)``."""
         ...
 
 
@@ -49,9 +49,9 @@ class Task:
 
     Args:
         environment: robot and world.
-        benchmark: goals of evaluation, a file or a function that makes them; None: goals all over T.
-        demonstrations: demonstrations of a teacher, a file or a function that makes them; None: no teacher.
-        correspondence: function (times, trajectory) -> theta_d, eq. (6); None: that of a `Translating` environment.
+        benchmark: file of benchmark goals, or function that makes them; None: goals all over T.
+        demonstrations: file of a teacher's demonstrations, or function that makes them; None: no teacher.
+        correspondence: function (times, trajectory) -> theta_d, eq. (6); None: method of a `Translating` environment.
 
     Raises:
         ValueError: a class was given instead of an environment.
@@ -67,20 +67,20 @@ class Task:
 
     @property
     def picture(self) -> Tracer | None:
-        """The ``trace`` of a `Drawn` environment, its result checked; None for any other environment."""
+        """The method ``trace`` of a `Drawn` environment, with checks of its result; None for other environments."""
         robot = self.environment
         return partial(traced, robot, robot.trace) if isinstance(robot, Drawn) else None
 
 
 def goals_all_over(environment: Environment) -> Benchmark:
-    """At most 500 goals all over T: a grid in one or two dimensions, Sobol points in more."""
+    """At most ``MOST_GOALS`` goals all over T: a grid in one or two dimensions, Sobol points in more."""
     box = environment.outcomes
     per_side = int(MOST_GOALS ** (1 / box.dim))
     if box.dim <= 2:
         steps = (np.arange(per_side) + 0.5) / per_side
         points = np.stack(np.meshgrid(*[steps] * box.dim), axis=-1).reshape(-1, box.dim)
     else:
-        from scipy.stats import qmc  # an import slower than this whole library
+        from scipy.stats import qmc  # slower to import than this whole library
 
         points = qmc.Sobol(box.dim, scramble=False).random_base2(int(np.log2(MOST_GOALS)))[1:]
     return Benchmark(type(environment).__name__, box.low + points * box.sides, float(box.sides.max()) / per_side)
@@ -90,8 +90,8 @@ def benchmark_of(task: Task, file: Path | None) -> tuple[Benchmark, list[str], s
     """Goals of evaluation, messages about them, and the checksum of their file (None: no file).
 
     Args:
-        task: task of the run; its goals are used if ``file`` is None.
-        file: file of other goals, or None.
+        task: task of the run.
+        file: file of goals to use in place of the task's goals, or None.
 
     Raises:
         ValueError: the goals do not fit the environment, or the file is damaged.
@@ -107,7 +107,7 @@ def benchmark_of(task: Task, file: Path | None) -> tuple[Benchmark, list[str], s
         benchmark = goals_all_over(robot)
         notes.append(
             f"{type(robot).__name__} has no benchmark goals: evaluations use {len(benchmark.goals)} points all over T, "
-            "reachable or not; sgimd benchmark makes goals from runs, for --benchmark or for a Task"
+            "reachable or not; for reachable goals, make a file with sgimd benchmark and use it as --benchmark"
         )
     benchmark.check(robot)
     return benchmark, notes, crc32
@@ -117,11 +117,11 @@ def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstra
     """Demonstrations of a teacher, messages about them, and the checksum of their file (None: no file).
 
     Args:
-        task: task of the run; its demonstrations are used if ``file`` is None.
-        file: file of other demonstrations, or None.
+        task: task of the run.
+        file: file of demonstrations to use in place of the task's demonstrations, or None.
 
     Raises:
-        ValueError: there are none, one cannot be translated, or the file is damaged.
+        ValueError: there are no demonstrations, one cannot be translated, or the file is damaged.
         OSError: there is no such file.
     """
     source, robot = file or task.demonstrations, task.environment
@@ -133,7 +133,7 @@ def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstra
     shown: Sequence[Demonstration]
     crc32: str | None = None
     if isinstance(source, Path):
-        from sgimd_torch.demonstrations import load_demonstrations  # loaded here, as most learners read none
+        from sgimd_torch.demonstrations import load_demonstrations  # imported here, as few runs need it
         from sgimd_torch.demonstrations.fit import misfit_of
 
         crc32 = checksum(source)
@@ -167,7 +167,7 @@ def correspondence_of(task: Task) -> Correspondence:
     """The function (times, trajectory) -> theta_d of a task.
 
     Raises:
-        ValueError: neither the task nor its environment has one.
+        ValueError: neither the task nor its environment has a correspondence.
     """
     if task.correspondence is not None:
         return task.correspondence

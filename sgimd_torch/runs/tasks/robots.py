@@ -1,4 +1,4 @@
-"""Arms and toys as tasks. Their benchmark goals and demonstrations are made here and are equal for every seed."""
+"""Arms, a swimmer and toys as tasks. Benchmark goals and demonstrations do not depend on the seed of a run."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from sgimd_torch.runs.tasks import Task
 from sgimd_torch.spaces import Array, Box, Demonstration, stream
 
 DATA: Final = SHIPPED_BENCHMARK.parent
-SIDE: Final = 0.1  # m, side of a benchmark tile; 311 goals lie in the disc of radius 1 m that these arms reach
-SHOWN: Final = 127  # demonstrations, as many as each shipped demonstrator recorded
-REACHING: Final = 20_000  # uniform movements that find the outcomes a toy can reach
-SAMPLES: Final = 5  # rows of the trajectory of each demonstration
+SIDE: Final = 0.1  # m, side of a benchmark tile; the disc of radius 1 m that an arm reaches has 311 goals
+SHOWN: Final = 127  # number of demonstrations, as of each shipped demonstrator
+REACHING: Final = 20_000  # number of uniform movements by which the reachable part of T is found
+SAMPLES: Final = 5  # number of samples in the trajectory of each demonstration
 
 
 def planar_arm(*, n_joints: int) -> Task:
@@ -49,15 +49,15 @@ def half_reached() -> Task:
 
 
 def arm_benchmark(arm: PlanarArm) -> Benchmark:
-    """One random goal in each tile of T that the arm can reach; equal in every run."""
+    """One random goal in each tile of T that the arm can reach; the goals are equal in every run."""
     box = arm.outcomes
     goals = tile_goals(np.tile(_grid(box, SIDE), (2, 1)), box, SIDE, stream(0, "goals for an arm"))
     return Benchmark(type(arm).__name__, goals[arm.reachable(goals)], SIDE)
 
 
 def arm_demonstrations(arm: PlanarArm) -> list[Demonstration]:
-    """Movements from rest to postures with equal joint angles; their ends spread evenly over the reachable disc."""
-    shares = (np.arange(SHOWN) + 0.5) / SHOWN  # shares of the disc's area, along a sunflower spiral
+    """Movements from rest to postures with all joint angles equal; outcomes spread evenly over the reachable disc."""
+    shares = (np.arange(SHOWN) + 0.5) / SHOWN  # shares of the disc's area, which make a sunflower spiral
     turns = np.pi * (3 - np.sqrt(5)) * np.arange(SHOWN)
     ends = np.sqrt(shares)[:, None] * np.stack([np.cos(turns), np.sin(turns)], axis=1)
     return [_led_to(arm, end) for end in ends]
@@ -78,28 +78,28 @@ def _led_to(arm: PlanarArm, end: Array) -> Demonstration:
 
 
 def toy(make: Callable[[], Toy], side: float, *, taught: bool) -> Task:
-    """A toy robot. Its goals lie on tiles of this ``side``, in the unit of T. If it is ``taught``, it has a teacher."""
+    """Task of a toy robot, with one goal in each tile of a ``side`` (unit of T), and a teacher if it is ``taught``."""
     robot = make()
     shown = partial(toy_demonstrations, robot) if taught else None
     return Task(robot, partial(toy_benchmark, robot, side), shown, last_row if taught else None)
 
 
 toss = partial(toy, toys.toss, 0.4, taught=True)
-"""A ball thrown in the wind; the wind is the context."""
+"""Ball that the robot throws in the wind; the wind is the context."""
 crawler = partial(toy, toys.crawler, 0.1, taught=False)
-"""Four legs, whose phases are periodic parameters."""
+"""Crawler with four legs; the phases of its legs are periodic parameters."""
 two_elbows = partial(toy, toys.two_elbows, 0.1, taught=False)
-"""An arm with two separate families of postures."""
+"""Arm that reaches each place by two separate families of postures."""
 spatial_arm = partial(toy, toys.spatial_arm, 25.0, taught=False)
-"""An arm with six joints and three outcomes, in cm."""
+"""Arm with six joints in space; its outcome is a position of three dimensions, in cm."""
 puck = partial(toy, objects.puck, 0.1, taught=False)
-"""A puck that has to be hit; the place of the puck is the context."""
+"""Puck that the robot has to hit; the place of the puck is the context."""
 fetch = partial(toy, objects.fetch, 0.1, taught=False)
-"""A ball that has to be grasped."""
+"""Ball that the robot has to grasp."""
 
 
 def toy_benchmark(robot: Toy, side: float) -> Benchmark:
-    """One random goal in each tile that uniform movements reach in the middle of C; equal in every run."""
+    """One random goal in each tile that uniform movements reach in the middle of C; goals are equal in every run."""
     rng = stream(0, "goals for a toy")
     thetas = robot.policies.low + robot.policies.sides * rng.random((REACHING, robot.policies.dim))
     context = (robot.contexts.low + robot.contexts.high) / 2
@@ -108,12 +108,12 @@ def toy_benchmark(robot: Toy, side: float) -> Benchmark:
 
 
 def last_row(times: Array, trajectory: Array) -> Array:
-    """The correspondence of a toy: each row of its demonstrations is theta itself."""
+    """The correspondence of a toy: each sample of its recordings is theta itself."""
     return trajectory[-1]
 
 
 def toy_demonstrations(robot: Toy) -> list[Demonstration]:
-    """Uniform movements with different outcomes, in contexts all over C; equal in every run."""
+    """Uniform movements with distinct outcomes, in contexts all over C; they are equal in every run."""
     rng = stream(0, "demonstrations by a toy")
     thetas = robot.policies.low + robot.policies.sides * rng.random((REACHING, robot.policies.dim))
     found = []

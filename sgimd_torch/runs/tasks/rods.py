@@ -16,21 +16,19 @@ from sgimd_torch.evaluation import SHIPPED as SHIPPED_BENCHMARK
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.spaces import Box, Demonstration
 
-LARGEST: Final = 1e6  # m, half side of T
+LARGEST: Final = 1e6  # m, largest half side of T
 
 
 @hands_on(FishingRod, "noise", "max_wind", "line")
 def fishing_rod(*, task_space: float = 1.0, threads: int = 1, **physics: Any) -> Task:
     """Arm with a fishing rod, in MuJoCo: the paper's task.
 
-    Goals come from a square of half side ``task_space`` m.
-
-    Demonstrations and goals of evaluation are always those of the paper's rod, without wind. If ``max_wind`` is above
-    0, they belong to the context 0.
+    Demonstrations and benchmark goals are those of the paper's rod without wind, whatever the options are. For a rod
+    with contexts, demonstrations and goals belong to the context 0.
 
     Args:
-        task_space: half side (m) of the square of goals; 100 in the paper's large-space experiment.
-        threads: number of threads of an evaluation; results do not depend on it.
+        task_space: half side (m) of T, a square; 100 in the paper's large-space experiment.
+        threads: number of threads of an evaluation; results do not depend on this number.
 
     Raises:
         ValueError: a number is out of its range.
@@ -54,9 +52,9 @@ rod_wind = partial(fishing_rod, max_wind=0.05)
 rod_yaw = partial(fishing_rod, max_yaw=0.5)
 """Rod with its base turned by up to half a radian; the angle is the context."""
 rod_long = partial(fishing_rod, line=1.5)
-"""Rod with a line 1.5 times as long as the line of the rod in its demonstrations."""
+"""Rod with a line 1.5 times as long as in its demonstrations."""
 
 
 def _in_context_zero(context_dim: int) -> list[Demonstration]:
-    """The shipped demonstrations, for a rod with contexts."""
+    """The shipped demonstrations, as demonstrations in the context 0 of a rod with contexts."""
     return [replace(shown, context=np.zeros(context_dim)) for shown in load_demonstrations()]

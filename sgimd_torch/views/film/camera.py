@@ -1,7 +1,7 @@
 """Films of the fishing rod: the arm casts, the line swings, the float lands near its goal.
 
-Section 4 of Nguyen & Oudeyer (2014). A film shows in real time a movement that ``FishingRod.trace`` has simulated.
-Line and float are drawn thicker than they are, to be visible. ``fishing_rod.xml`` defines light, shadow, reflection.
+Section 4 of Nguyen & Oudeyer (2014). A film shows, in real time, movements that ``FishingRod.trace`` has simulated.
+Line and float are drawn thicker than in the model, to be visible. ``fishing_rod.xml`` defines lights and materials.
     with Camera(rod.model) as camera: write_film(Path("film.mp4"), shoot(camera, [Shot(recording, goal)]))
 
 Needs the extra ``film`` and OpenGL: without a display, set MUJOCO_GL=egl before the first import of mujoco.
@@ -24,7 +24,7 @@ from sgimd_torch.environments.rod_physics import RodTrace
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.film.reel import HEIGHT, WIDTH, Shot
 
-MOST_PAST: Final = 250  # largest number of past landings drawn; they double the time of a frame
+MOST_PAST: Final = 250  # largest number of past landings in a frame; 250 landings double the time of drawing a frame
 
 _Colour = tuple[float, float, float, float]
 _INK, _FLOAT, _GOAL, _PATH = (0.06, 0.06, 0.08, 1), (0.92, 0.24, 0.02, 1), (0.94, 0.89, 0.26, 1), (0.6, 0.28, 0.12, 1)
@@ -38,12 +38,12 @@ class Camera:
         model: MuJoCo model of the rod; it is not changed.
 
     Raises:
-        ImportError: there is no OpenGL, or no OpenGL of the kind that MUJOCO_GL names.
+        ImportError: OpenGL is not available in the form that the variable MUJOCO_GL names.
     """
 
     def __init__(self, model: mujoco.MjModel) -> None:
         self._model = copy.copy(model)
-        for name in ("line", "float"):  # ``frame`` draws these
+        for name in ("line", "float"):  # hidden here, because ``frame`` draws both thicker
             self._model.material(name).rgba[3] = 0.0
         self._data = mujoco.MjData(self._model)
         self._tip = self._model.site("tip").id
@@ -64,10 +64,10 @@ class Camera:
         self._renderer.close()
 
     def frame(self, shot: Shot, time: float) -> Image.Image:
-        """The scene at ``time`` (s). A time after the landing gives the scene at the landing.
+        """The scene at ``time`` (s); after the landing, the scene at the landing.
 
-        It shows arm, line, float and the float's path. On the water it shows the goal, past landings, and circles with
-        radii of 0.5 m and 1 m around the arm.
+        The picture shows arm, line, float and the path of the float. On the water it shows the goal, past landings, and
+        circles with radii of 0.5 m and 1 m around the arm.
         """
         recording = _trace(shot)
         time = min(time, recording.landed)
@@ -92,7 +92,7 @@ class Camera:
 
     @staticmethod
     def note(shot: Shot, time: float) -> str:
-        """The words "line let out" from the moment when the line is let out, "" before."""
+        """The note "line let out" from the moment when the line is let out, "" before."""
         let_out = _trace(shot).let_out
         return "line let out" if let_out is not None and time > let_out else ""
 

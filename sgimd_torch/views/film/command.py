@@ -1,12 +1,12 @@
-"""Film what a run has learnt: the robot executes the movements that the run infers for chosen goals.
+"""Film what a run has learnt: the robot executes the movements that the inverse model of the run infers for goals.
 
-The memory is rebuilt from the record. The inverse model of the run infers a movement for each goal, and the robot
-executes this movement once, with noise, in the middle of C. The yellow ring is the goal, dots are past outcomes, and
-a red cross is the outcome. A panel shows benchmark goals, coloured by error, and the curve of the mean error.
+The memory is rebuilt from the record. The robot executes the movement inferred for each goal once, with motor noise, in
+the middle of C. A yellow ring is the goal, dots are past outcomes, and a red cross is the outcome. A panel shows the
+benchmark goals, coloured by error, and the curve of the mean error.
 
-The fishing rod is drawn by MuJoCo, with circles at 0.5 m and 1 m around its base. If the float is still in the air
-after the movement, the line is let out and the float falls; the caption says so. Planar arms, and your own
-environments with a method trace(context, theta, rng) -> Sketch, are drawn in the plane.
+MuJoCo draws the fishing rod, with circles of radius 0.5 m and 1 m around its base. If the float is still in the air
+after the movement, the line is let out and the float falls, as the caption says. Planar arms, and your own environments
+with a method trace(context, theta, rng) -> Sketch, are drawn in the plane.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _parts(run: Run, *, trust: bool) -> RunParts:
-    """The parts of the run. For the rod this imports MuJoCo, which then chooses how to draw; the import may fail."""
+    """The parts of the run. The rod imports MuJoCo, and this import fails if OpenGL is not available."""
     if sys.platform == "linux":
         os.environ.setdefault("MUJOCO_GL", "egl")  # works without a display
     try:
@@ -93,7 +93,7 @@ def _parts(run: Run, *, trust: bool) -> RunParts:
 
 
 def _painter(robot: Any, shots: Sequence[Shot]) -> AbstractContextManager[Painter]:
-    """The painter of these shots."""
+    """The painter for a robot and its shots."""
     if isinstance(shots[0].recording, Sketch):
         return nullcontext(Sketchbook(robot.outcomes, shots))
     from sgimd_torch.views.film.camera import Camera  # only the rod needs OpenGL
@@ -102,10 +102,11 @@ def _painter(robot: Any, shots: Sequence[Shot]) -> AbstractContextManager[Painte
 
 
 def _cast(run: Run, parts: RunParts, goals: Array, stages: Sequence[int]) -> list[Shot]:
-    """The shots: the movement inferred for each goal at each stage, with the same motor noise at all stages.
+    """The shots: the movement inferred for each goal at each stage, with equal motor noise at all stages.
 
-    The panel beside a shot has the errors of the benchmark goals in the same context, and the curve of the mean error
-    over the stages; a film of one stage shows the curve of the run's evaluations.
+    A stage is a number of movements of the learner. The panel beside a shot shows the errors of the benchmark goals at
+    this stage, and the curve of the mean error over all stages. If there is one stage, the curve has the evaluations of
+    the run.
     """
     picture = parts.task.picture
     assert picture is not None
@@ -136,9 +137,9 @@ def _cast(run: Run, parts: RunParts, goals: Array, stages: Sequence[int]) -> lis
 
 
 def remember(run: Run, parts: RunParts, start: int, stop: int) -> None:
-    """Add to the memory what the learner remembered in movements ``start`` to ``stop``; train its forward model."""
+    """Add the exemplars of the movements from ``start`` to ``stop`` to the memory, and train the forward model."""
     memory, correspondence = parts.learner.memory, parts.learner.correspondence
-    by_observation = isinstance(parts.learner.social, Remember)  # other learners remember only their own movements
+    by_observation = isinstance(parts.learner.social, Remember)  # only such learners remember demonstrations
     for row in range(start, min(stop, len(run.index))):
         if by_observation and correspondence is not None and run.demonstration[row] >= 0:
             shown = run.demonstrations[run.demonstration[row]]
@@ -150,7 +151,7 @@ def remember(run: Run, parts: RunParts, start: int, stop: int) -> None:
 
 
 def _stages(run: Run, options: argparse.Namespace) -> list[int]:
-    """The numbers of movements after which to film."""
+    """The numbers of movements of the learner after which to film."""
     lived = len(run.index)
     if not lived:
         raise ValueError(f"{run.path} has no movements yet; continue the run with --resume")
@@ -177,7 +178,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def _options(argv: Sequence[str] | None) -> argparse.Namespace:
-    # A minus with a number after it begins a goal, not an option.
+    # A word that begins with a minus and a digit is a goal, not an option; argparse takes it so after a space.
     given = sys.argv[1:] if argv is None else argv
     options = parser().parse_args([f" {word}" if re.match(r"-[.\d]", word) else word for word in given])
     if options.out is None:
@@ -188,5 +189,5 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
 
 
 def numbers(text: str) -> list[float]:
-    """A goal of the command line, such as "0.3,0.6"; argparse shows this function's name if a goal is wrong."""
+    """A goal on the command line, such as "0.3,0.6". Error messages of argparse have the name of this function."""
     return [float(word) for word in text.split(",")]

@@ -1,4 +1,4 @@
-"""The panel beside a film: a map of the benchmark goals, coloured by error, and the curve of the mean error.
+"""The panel beside the robot in a film: a map of the benchmark goals, and the curve of the mean error.
 
     picture = panel(space, goals, errors, 500, (movements, mean_errors), colour)
 The map shows the first two dimensions of T. Needs the extra ``film``.
@@ -26,14 +26,14 @@ _TEXT: Final[Any] = {"font.size": 8, "axes.titlesize": 9, "axes.titlelocation": 
 
 
 def panel(space: Box, goals: Array, errors: Array, now: int, curve: tuple[Array, Array], colour: str) -> Frame:
-    """Map and curve after ``now`` movements.
+    """A picture of map and curve after ``now`` movements of the learner.
 
     Args:
         space: T, with names and unit.
         goals: ``(n, outcome_dim)`` goals of the benchmark.
         errors: ``(n,)`` errors of these goals, in the unit of T.
         now: number of movements of the learner.
-        curve: ``(m,)`` numbers of movements and ``(m,)`` mean errors after them; the line ends at ``now``.
+        curve: ``(m,)`` numbers of movements and ``(m,)`` mean errors; later points than ``now`` are left out.
         colour: colour of the curve.
     """
     shown, near = limits(goals, space), rounded(float(np.ptp(goals, axis=0).max() or 1.0) / 50)

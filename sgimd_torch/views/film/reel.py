@@ -1,6 +1,6 @@
-"""The parts of every film: shots, frames, captions, and the file.
+"""Common parts of all films: shots, frames, captions, and the file.
 
-``camera.py`` draws the rod; ``sketch.py`` draws robots in the plane; ``panel.py`` draws map and curve beside the robot.
+``camera.py`` draws the rod, ``sketch.py`` robots in the plane, and ``panel.py`` the map and the curve beside the robot.
     write_film(Path("film.mp4"), shoot(camera, [Shot(recording, goal)]))
 
 Needs the extra ``film``.
@@ -28,10 +28,10 @@ from sgimd_torch.spaces import Array
 Frame = NDArray[np.uint8]  # (height, width, 3)
 
 WIDTH: Final = 640  # pixels, width of the picture of the robot
-HEIGHT: Final = 480  # pixels
+HEIGHT: Final = 480  # pixels, height of a frame
 PAUSE: Final = 0.8  # s, time during which the end of a movement is shown
 RATES: Final = {".mp4": 25.0, ".webp": 12.5}
-"""Frames per second of each kind of film: .mp4 for every player, .webp for a page in every browser."""
+"""Frames per second of each kind of film: .mp4 plays in every player, .webp in every browser."""
 
 _CODECS: Final = {
     ".mp4": ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "23", "-movflags", "+faststart", "-f", "mp4"],
@@ -44,12 +44,12 @@ class Shot:
     """One movement to film.
 
     Args:
-        recording: movement to show.
-        goal: ``(outcome_dim,)`` in T.
+        recording: trajectory of the movement.
+        goal: ``(outcome_dim,)`` goal of the movement.
         title: text at the upper edge, "" for none.
         unit: unit of T.
-        past: ``(n, outcome_dim)`` earlier outcomes.
-        beside: picture to the right of the movement, None for none.
+        past: ``(n, outcome_dim)`` earlier outcomes to draw.
+        beside: picture to the right of the robot, None for none.
     """
 
     recording: Trace
@@ -77,19 +77,19 @@ class Shot:
 
 
 class Painter(Protocol):
-    """Draws the frames of shots."""
+    """A painter draws the frames of shots."""
 
     def frame(self, shot: Shot, time: float) -> Image.Image:
-        """The scene at ``time`` (s). A time after the end of the movement gives the scene at the end."""
+        """The scene at ``time`` (s); after the end of the movement, the scene at the end."""
         ...
 
     def note(self, shot: Shot, time: float) -> str:
-        """Words for the caption at ``time`` (s), "" for none."""
+        """A note for the caption at ``time`` (s), "" for none."""
         ...
 
 
 def shoot(painter: Painter, shots: Iterable[Shot], rate: float = RATES[".mp4"]) -> Iterator[Frame]:
-    """The frames of a film, ``rate`` per second: each shot's movement, then its end during ``PAUSE``."""
+    """The frames of a film, ``rate`` per second: each movement, with its end shown for ``PAUSE`` seconds."""
     for shot in shots:
         for time in shot.moments(rate):
             frame = captioned(painter.frame(shot, time), shot.title, shot.caption(time, painter.note(shot, time)))
@@ -109,7 +109,7 @@ def captioned(image: Image.Image, title: str, caption: str) -> Frame:
 
 
 def write_film(path: Path, frames: Iterable[Frame]) -> None:
-    """Write a film as H.264 in an mp4 file or as an animated webp picture; if this fails, ``path`` is unchanged.
+    """Write a film as H.264 in an mp4 file, or as an animated webp picture; after a failure ``path`` is unchanged.
 
     Args:
         path: file with an ending in ``RATES``.
@@ -120,7 +120,7 @@ def write_film(path: Path, frames: Iterable[Frame]) -> None:
     """
     frames, kind = iter(frames), path.suffix
     with replacing(path) as partial:
-        partial.touch()  # a folder that is not writable is refused before the first frame is drawn
+        partial.touch()  # refuses a read-only folder before the first frame is drawn
         first = next(frames)
         size = f"{first.shape[1]}x{first.shape[0]}"
         given = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", size, "-r", str(RATES[kind]), "-i", "-"]

@@ -1,8 +1,8 @@
-"""Films of robots in the plane: the chains of links of a ``Sketch``, drawn without OpenGL.
+"""Films of robots in the plane: chains of links from a ``Sketch``, drawn without OpenGL.
 
     write_film(Path("film.mp4"), shoot(Sketchbook(arm.outcomes, shots), shots))
-The goal is a ring, past outcomes are dots, the outcome is a cross, the end of the chain leaves a path. The first two
-dimensions of an outcome are x and y of the picture; if an outcome has only one dimension, y is 0.
+The goal is a ring, past outcomes are dots, the outcome is a cross, and a line is the path of the chain's end. The first
+two dimensions of an outcome are x and y of the picture; if an outcome has only one dimension, y is 0.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ class Sketchbook:
     """A `Painter` of shots whose movements are ``Sketch``es.
 
     Args:
-        space: T, drawn as a frame.
-        shots: all shots of the film; the scale fits the shots, so parts of T may lie outside.
+        space: T, whose border is drawn.
+        shots: all shots of the film; the scale fits their movements, so parts of T may lie outside the picture.
     """
 
     def __init__(self, space: Box, shots: Sequence[Shot]) -> None:
@@ -45,7 +45,7 @@ class Sketchbook:
         self._ax = self._figure.add_axes((0, 0, 1, 1))
 
     def frame(self, shot: Shot, time: float) -> Image.Image:
-        """The robot at ``time`` (s). A time after the end of the movement gives its end and the outcome."""
+        """The robot at ``time`` (s); after the end of the movement, the last posture and the outcome."""
         sketch, chains, ax = shot.recording, _chains(shot), self._ax
         assert isinstance(sketch, Sketch)
         chain = chains[: min(round(time / sketch.step), len(chains) - 1) + 1]

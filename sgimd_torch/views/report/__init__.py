@@ -1,1 +1,1 @@
-"""One page about one run, or about many side by side."""
+"""A report: one page about one run, or about many runs side by side."""

@@ -1,6 +1,6 @@
 """The figures of a report: small images, readable at a width of 400 pixels.
 
-source = curves(variants, colours_of(variants))    # the data address of a png, for the src of an img
+source = curves(variants, colours_of(variants))    # a png as a data URL, for <img src=...>
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from sgimd_torch.views.variants import Variant
 
 P = ParamSpec("P")
 TILES: Final = 50  # largest number of tiles along the longer side of a map
-GOALS: Final = 100  # number of the latest goals that an interest map shows
+GOALS: Final = 100  # number of latest goals in an interest map
 MOST_CURVES: Final = 8  # largest number of curves in one figure
 WIDE: Final = 4.3  # inches, width of the axes of a map, without colour bar
 MARGIN: Final = 1.2  # inches, height above and below the axes
@@ -40,12 +40,12 @@ STYLE: Final[Any] = {
     "lines.linewidth": 2,
     "legend.fontsize": 10,
 }
-# Colours for further variants of an algorithm, by Okabe & Ito and P. Tol; no algorithm of the paper has them.
+# Colours for further variants of an algorithm, from Okabe & Ito and P. Tol; no algorithm of the paper has one of them.
 _FURTHER: Final = ("#e69f00", "#56b4e9", "#000000", "#882255", "#999933", "#aa4499", "#44aa99", "#661100")
 
 
 def png(draw: Callable[Concatenate[Figure, P], None]) -> Callable[P, str]:
-    """Turn a function that draws into a function that returns a png, sharp on dense screens, as a data address."""
+    """Turn a function that draws on a figure into a function that returns the figure as a png, in a data URL."""
 
     @wraps(draw)
     def address(*args: P.args, **kwargs: P.kwargs) -> str:
@@ -60,9 +60,9 @@ def png(draw: Callable[Concatenate[Figure, P], None]) -> Callable[P, str]:
 
 
 def colours_of(variants: Sequence[Variant]) -> dict[str, str]:
-    """A colour for each name: the first variant of an algorithm has the algorithm's colour, others have further ones.
+    """Colours by name of the variant: one variant of each algorithm has the algorithm's colour, others have new ones.
 
-    The first variant is the one named like the algorithm, or else the first by name, whatever the results are.
+    The algorithm's colour goes to the variant named like the algorithm, or else to the first variant by name.
     """
     ordered = sorted(variants, key=lambda variant: (variant.name != variant.algorithm, variant.name))
     firsts = {variant.algorithm: variant.name for variant in reversed(ordered)}
@@ -73,9 +73,9 @@ def colours_of(variants: Sequence[Variant]) -> dict[str, str]:
 
 
 def error_curves(figure: Figure, variants: Sequence[Variant], colours: Mapping[str, str]) -> None:
-    """Error against movements: interquartile means over seeds, with intervals, or with points if seeds are few.
+    """Error against movements: interquartile means over seeds with intervals, or points if there are too few seeds.
 
-    If there is only one variant, a thin line for each seed and the noise floor are drawn, too.
+    A figure of a single variant also shows the noise floor, and a thin line for each seed.
     """
     if len(variants) > 1:
         figure.set_size_inches(6.8, 4.5)
@@ -111,7 +111,7 @@ def figure_of_curves(variants: Sequence[Variant]) -> Figure:
 
 
 def planes_of(variants: Sequence[Variant]) -> dict[str, Box]:
-    """The part of T that maps show, by environment; it holds the landing points of all variants there."""
+    """The part of T that maps show, by environment; it contains the outcomes of all variants in this environment."""
     found: dict[str, list[Array]] = {}
     for variant in variants:
         if len(variant.landed):
@@ -126,7 +126,7 @@ def planes_of(variants: Sequence[Variant]) -> dict[str, Box]:
 
 @png
 def landing(figure: Figure, variant: Variant, plane: Box) -> None:
-    """Landing points and demonstrated outcomes on a part of T; points outside this part are marked at its edge."""
+    """Outcomes of movements and of demonstrations on a part of T; points outside this part are marked at its edge."""
     panels, shown = sections(plane), variant.demonstrated
     for ax, section in zip(_panels(figure, panels), panels, strict=True):
         sides = section.box.sides
@@ -152,7 +152,7 @@ def has_regions(run: Run) -> bool:
 
 @png
 def regions(figure: Figure, run: Run) -> None:
-    """The regions of T at the last evaluation, coloured by interest, with the goals chosen last."""
+    """The regions of T at the last evaluation, coloured by interest, with the latest goals."""
     assert run.regions is not None
     lows, highs, interests = map_after(run.regions, run.regions["movements"].max())
     panels = of_regions(lows, highs, run.spaces["outcomes"])
@@ -161,14 +161,14 @@ def regions(figure: Figure, run: Run) -> None:
 
 
 def _panels(figure: Figure, shown: Sequence[Section]) -> list[Axes]:
-    """Axes below each other, one for each section, with the shape of the section."""
+    """Axes below each other, one for each section of T, each with the aspect ratio of its section."""
     heights = [section.height(WIDE) for section in shown]
     figure.set_size_inches(6, sum(heights) + MARGIN * len(shown))
     return list(figure.subplots(len(shown), 1, squeeze=False, height_ratios=heights).flat)
 
 
 def _plain(name: str) -> str:
-    """A label of matplotlib for a name; it is no formula, not hidden, and not too long."""
+    """A name as a matplotlib label: shortened, not read as a formula ($), and not hidden (by a leading _)."""
     short = name if len(name) <= 32 else f"{name[:30]}…"
     return f"{' ' * short.startswith('_')}{short}".replace("$", r"\$")
 

@@ -1,4 +1,4 @@
-"""The page of a report: ``template.html.j2`` filled with figures and numbers of each variant, as one file.
+"""The page of a report: ``template.html.j2``, filled with figures and numbers of each variant.
 
 html = page(Path("runs"), variants)    # variants come from best_first; text from runs is escaped
 """

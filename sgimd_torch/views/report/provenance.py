@@ -1,4 +1,4 @@
-"""Provenance of the runs of a report: doubts, differing settings, versions, commands that repeat the runs.
+"""Provenance of the runs of a report: warnings, differing settings, versions, and commands that repeat the runs.
 
 doubts(variants)    # ["1 run not finished: ..."];   commands(variant.runs)    # ["sgimd run --algorithm=sgim-d ..."]
 """
@@ -19,24 +19,24 @@ AGAIN: Final = "runs/again"  # folder for the repeated runs
 
 
 def doubts(variants: Sequence[Variant]) -> Iterator[str]:
-    """Sentences that a reader should know before comparing these runs."""
+    """Warnings for a reader who wants to compare these runs, one sentence each."""
     every = [run for variant in variants for run in variant.runs]
     few = [f"{variant.label} ({len(variant.used)})" for variant in variants if 0 < len(variant.used) < LEAST_SEEDS]
     if few and len(every) > 1:
-        yield f"Fewer than {LEAST_SEEDS} seeds: {', '.join(few)}. These have points, but no intervals and no verdict."
+        yield f"Fewer than {LEAST_SEEDS} seeds: {', '.join(few)}. They have points, but no intervals and no verdict."
     if len({run.files.get("benchmark_crc32") for run in every}) > 1:
         yield "The runs were evaluated on different benchmarks, so their errors cannot be compared."
     for name, values in versions(variants).items():
         if len(values) > 1 and name != "platform":
             yield f"The runs were made with different versions of {name}: {', '.join(values)}."
     if dirty := sum(str(run.versions.get("commit")).endswith("-dirty") for run in every):
-        yield f"{_count(dirty)} came from a checkout with uncommitted changes, which are not in the commit."
+        yield f"{_count(dirty)} came from a checkout with uncommitted changes, which the commit lacks."
     for variant in variants:
         if own := differing([variant]):
             yield f"The seeds of {variant.label} have different settings: they differ in {', '.join(own)}."
     lasts = sorted({variant.last for variant in variants if variant.last})
     if len(lasts) > 1:
-        yield f"Last errors are those after different numbers of movements: {', '.join(map(str, lasts))}."
+        yield f"The last errors belong to different numbers of movements: {', '.join(map(str, lasts))}."
     cut = [run for run in every if not run.summary["finished"]]
     if cut:
         named = [f"{run.path}: {len(run.index)} of {run.config['movements']} movements" for run in cut]
@@ -44,7 +44,7 @@ def doubts(variants: Sequence[Variant]) -> Iterator[str]:
 
 
 def versions(variants: Sequence[Variant]) -> dict[str, dict[str, None]]:
-    """Versions by name, the commit first. If a run was resumed, the versions of its earlier parts count, too."""
+    """Versions by name, the commit first; of a resumed run, also the versions before it was resumed."""
     found: dict[str, dict[str, None]] = {"commit": {}}
     for run in [run for variant in variants for run in variant.runs]:
         for made_by in (run.versions, *run.versions.get("before", ())):
@@ -55,7 +55,7 @@ def versions(variants: Sequence[Variant]) -> dict[str, dict[str, None]]:
 
 
 def commands(runs: Sequence[Run]) -> list[str]:
-    """Shell commands that repeat the runs. Seeds with equal settings share a command, which omits defaults."""
+    """Shell commands that repeat the runs, one for all seeds with equal settings. Default options are left out."""
     groups: dict[str, list[int]] = {}
     for run in runs:
         own = [word for word in run.words if word.partition("=")[0] not in ("--seed", "--out", "--board")]
@@ -68,7 +68,7 @@ def commands(runs: Sequence[Run]) -> list[str]:
 
 
 def differing(variants: Sequence[Variant]) -> dict[str, list[str]]:
-    """Settings in which runs differ, except seed and place, with the values of each variant as text."""
+    """Settings in which runs differ, except the seed and the folders, with the values of each variant as text."""
     found = {}
     for name in dict.fromkeys(name for variant in variants for run in variant.runs for name in run.config):
         values = [dict.fromkeys(shown(run.config.get(name)) for run in variant.runs) for variant in variants]
