@@ -152,16 +152,16 @@ def test_a_search_through_a_model_goes_on_when_the_model_is_refreshed_as_the_loo
     lines = []
     for episode in run(whole, ARM, 5, movements=140):
         lines.append(line(episode))
-        shared.refresh(whole.memory, episode.move.goal)
+        shared.refresh(whole.memory)
         if episode.index == 99:
             save_life(whole, tmp_path / "life.sqlite")
     assert shared.model.trained
     shared, again = build()
-    load_life(again, tmp_path / "life.sqlite", after=lambda move: shared.refresh(again.memory, move.goal))
+    load_life(again, tmp_path / "life.sqlite", after=lambda move: shared.refresh(again.memory))
     rest = []
     for episode in run(again, ARM, 5, movements=140):
         rest.append(line(episode))
-        shared.refresh(again.memory, episode.move.goal)
+        shared.refresh(again.memory)
     assert rest == lines[100:]
 
 
