@@ -28,9 +28,9 @@ with loading():  # Ctrl-C shows no traceback
     from sgimd_torch.files import make_folder
     from sgimd_torch.record import RunError
     from sgimd_torch.runs.config import OWN, Config
-    from sgimd_torch.runs.engines.loop import sweep
+    from sgimd_torch.runs.parallel import sweep
     from sgimd_torch.runs.read import finished, read_run
-    from sgimd_torch.runs.sweep import add_engines, add_options, engine_of
+    from sgimd_torch.runs.sweep import add_options
     from table import FILE, ROWS, Row, answers_of, merge, own_answer, read_table, result_rows
     from variants import ALIKE, ANSWERS, EXPERIMENTS, MADE, SEEDS, SMALL_TABLES, Variant, make_subsets, seeds_of
 
@@ -186,8 +186,7 @@ def collect(experiment: str, config: Config, results: Path) -> None:
 def _run(configs: Sequence[Config], options: argparse.Namespace, on_end: Any = None) -> list[str]:
     """Carry out runs; returns error messages, one for each failed run."""
     make_subsets(options.out / "demonstrations", by_hand="by-hand" in options.experiments)
-    with engine_of(options, configs) as engine:
-        return sweep(configs, engine, on_end=on_end)
+    return sweep(configs, options.processes, on_end=on_end)
 
 
 def _in_words(row: Row) -> str:
@@ -207,7 +206,6 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
         "--only", nargs="+", default=[], metavar="VARIANT", help="variants to run (default: all of them)"
     )
     add_options(parser, seeds=None, default="seeds of the page of each experiment")
-    add_engines(parser)
     parser.add_argument("--out", type=Path, default=Path("runs"), help="folder of the runs (default: %(default)s)")
     parser.add_argument("--results", type=Path, default=Path("results"), help=results)
     parser.add_argument(

@@ -18,7 +18,7 @@ from jsonargparse.typing import NonNegativeInt, Path_fc, PositiveInt
 
 from sgimd_torch.evaluation import SHIPPED
 from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.engines.loop import local, sweep
+from sgimd_torch.runs.parallel import sweep
 from sgimd_torch.runs.process import Failed
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.spaces import Array
@@ -31,9 +31,7 @@ def live(learners: Iterable[tuple[str, int]], movements: int, processes: int, fo
         Config(algorithm=algorithm, seed=seed, movements=movements, evaluate_at=(), out=folder)
         for algorithm, seed in learners
     ]
-    with local(processes) as submit:
-        failures = sweep(configs, submit)
-    if failures:
+    if failures := sweep(configs, processes):
         raise Failed("\n".join(failures))
     return [config.directory for config in configs]
 

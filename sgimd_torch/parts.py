@@ -117,7 +117,7 @@ class Trained(ABC):
 
     @abstractmethod
     def listener(self, life: Any) -> Any:
-        """Listener (`runs.listeners.Listener`) that calls `refresh` in the run ``life`` (`runs.run.Life`)."""
+        """Listener (`runs.run.Listener`) that calls `refresh` in the run ``life`` (`runs.run.Life`)."""
 
 
 class Goals(Part):

@@ -41,91 +41,53 @@ SEARCHING: Final[dict[str, Any]] = {
 
 
 @hands_on(GoalBabbling, **STRATEGIC)
-def _asking(
-    environment: Environment,
-    seed: int,
-    imitates_only: bool,
-    *,
-    correspondence: Correspondence,
-    teachers: Mapping[str, Demonstrator],
-    cost: float = 1.0,
-    repeats: int = 1,
-    epsilon: float = 0.0,
-    inverse: MakeInverse = LocalProcess,
-    memory: Memory | None = None,
-    **parts: Any,
-) -> Learner:
-    """A learner that asks for demonstrations. By default it practises and executes each demonstration once.
-
-    Args:
-        cost: cost of a demonstration; an autonomous attempt costs 1.
-        repeats: number of movements for one demonstration.
-        epsilon: largest variation of each parameter, in the unit of the parameter.
-        inverse: inverse model; searches begin at its answer.
-        memory: exemplars to start from; None: the memory starts empty.
-    """
-    problem = Problem(environment, seed, memory, inverse=inverse)
-    problem.autonomous = babbling = GoalBabbling(problem, **parts)
-    emulates = babbling.budget > 1 and not imitates_only  # emulation by one movement would be an autonomous attempt
-    asking = dict[str, Asking]()
-    for teacher, demonstrator in teachers.items():
-        name = f"imitate {teacher}"
-        mimic = Mimic(problem, repeats=repeats, epsilon=epsilon, draws_from=name)
-        asking[name] = Asking(teacher, mimic, cost, demonstrator.takes)
-        if emulates:
-            emulate = Emulate(problem, strategy=AUTONOMOUS)
-            asking[f"emulate {teacher}"] = Asking(teacher, emulate, cost, demonstrator.takes)
-    return Learner(problem, StrategicBabbling(problem, babbling, asking), correspondence=correspondence)
-
-
-@hands_on(_asking)
 def sgim_acts(
     environment: Environment,
     seed: int,
     *,
     correspondence: Correspondence,
     teachers: Mapping[str, Demonstrator],
-    **options: Any,
+    cost: float = 1.0,
+    repeats: int = 1,
+    epsilon: float = 0.0,
+    emulates: bool = True,
+    inverse: MakeInverse = LocalProcess,
+    memory: Memory | None = None,
+    **parts: Any,
 ) -> Learner:
     """SGIM-ACTS: practice; chooses when, whom and what to ask, and how to use the demonstration.
+
+    By default it practises and executes each demonstration once.
 
     Args:
         environment: robot and world; nothing is executed here.
         seed: number from which all random streams of the learner come.
         correspondence: function from times and trajectory to theta_d, eq. (6).
         teachers: mapping from names to teachers, as for ``run``.
-        options: ``cost``, ``repeats``, ``epsilon``, ``inverse``, ``memory``, and options of `GoalBabbling`; the goal
-            model must be a `StrategicGoals`.
+        cost: cost of a demonstration; an autonomous attempt costs 1.
+        repeats: number of movements for one demonstration.
+        epsilon: largest variation of each parameter, in the unit of the parameter.
+        emulates: whether emulation is a choice beside imitation. It matters only with a budget above 1, because
+            emulation by one movement would be an autonomous attempt.
+        inverse: inverse model; searches begin at its answer.
+        memory: exemplars to start from; None: the memory starts empty.
+        parts: options of `GoalBabbling`; the goal model must be a `StrategicGoals`.
     """
-    return _asking(environment, seed, False, correspondence=correspondence, teachers=teachers, **options)
+    problem = Problem(environment, seed, memory, inverse=inverse)
+    problem.autonomous = babbling = GoalBabbling(problem, **parts)
+    asking = dict[str, Asking]()
+    for teacher, demonstrator in teachers.items():
+        name = f"imitate {teacher}"
+        mimic = Mimic(problem, repeats=repeats, epsilon=epsilon, draws_from=name)
+        asking[name] = Asking(teacher, mimic, cost, demonstrator.takes)
+        if emulates and babbling.budget > 1:
+            emulate = Emulate(problem, strategy=AUTONOMOUS)
+            asking[f"emulate {teacher}"] = Asking(teacher, emulate, cost, demonstrator.takes)
+    return Learner(problem, StrategicBabbling(problem, babbling, asking), correspondence=correspondence)
 
 
-@hands_on(_asking)
-def sgim_im(
-    environment: Environment,
-    seed: int,
-    *,
-    correspondence: Correspondence,
-    teachers: Mapping[str, Demonstrator],
-    **options: Any,
-) -> Learner:
-    """SGIM-IM: practice; chooses when to ask its only teacher, and for which goal.
-
-    Args:
-        environment: robot and world; nothing is executed here.
-        seed: number from which all random streams of the learner come.
-        correspondence: function from times and trajectory to theta_d, eq. (6).
-        teachers: mapping from names to teachers, with one entry.
-        options: options of `sgim_acts`.
-
-    Raises:
-        ValueError: there is not exactly one teacher.
-    """
-    if len(teachers) != 1:
-        raise ValueError(f"sgim_im asks one teacher, got {len(teachers)}; is sgim_acts meant?")
-    return _asking(environment, seed, True, correspondence=correspondence, teachers=teachers, **options)
-
-
+sgim_im = partial(sgim_acts, emulates=False)
+"""SGIM-IM: practice; chooses when to ask its teacher, and for which goal; only imitates."""
 sgim_acts_search = partial(sgim_acts, **SEARCHING)
 """SGIM-ACTS, as published: a search at each goal instead of practice."""
 sgim_im_search = partial(sgim_im, **SEARCHING)

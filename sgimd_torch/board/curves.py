@@ -11,14 +11,12 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.goals.regions import Region
-from sgimd_torch.spaces import Array, Box, Episode
+from sgimd_torch.spaces import Array, Episode
 
 DEPTH: Final = 3  # levels of the tree of regions, below its root, that have curves; so at most 15 regions have them
-PLACES: Final = 4  # largest number of places, cells of T, that have a curve; 2 x 2 in the plane
 _RECENT: Final = 50  # number of latest goals over which the curves of goals are computed
 
 
@@ -76,56 +74,16 @@ class Behaviour:
         return values
 
 
-def of_evaluation(found: Evaluation, near: float, places: Mapping[str, NDArray[np.bool_]]) -> dict[str, float]:
-    """Values of the curves of an evaluation by tag: errors, and the share of goals that are met in each place.
-
-    Args:
-        found: evaluation of n goals.
-        near: largest error, in the unit of T, at which a goal counts as met.
-        places: mask ``(n,)`` of the goals that lie in each place, by the name of the place.
-    """
-    met = found.errors <= near
+def of_evaluation(found: Evaluation, near: float) -> dict[str, float]:
+    """Values of the curves of an evaluation by tag; a goal with an error of at most ``near`` counts as met."""
     return {
         "error/mean": found.mean_error,
         "error/median": float(np.median(found.errors)),
         "error/p90": float(np.quantile(found.errors, 0.9)),
         "error/noise_floor": found.noise_floor,
         **({"error/failed": float(found.failed.sum())} if found.failed.any() else {}),
-        "met/everywhere": float(met.mean()),
-        **{f"met/{name}": float(met[inside].mean()) for name, inside in places.items()},
+        "goals/met": float((found.errors <= near).mean()),
     }
-
-
-def places_of(space: Box, goals: Array) -> dict[str, NDArray[np.bool_]]:
-    """Places of T: cells of equal size that together cover the goals of a benchmark.
-
-    Every T that contains all goals has the same places, so runs with one benchmark can be compared.
-
-    Args:
-        space: T.
-        goals: ``(n, outcome_dim)``, in T.
-
-    Returns:
-        Mask ``(n,)`` of the goals in each place, by the name of the place, such as "x -1..0 y 0..1". Places without
-        goals are left out; a T of more than two dimensions has no places. Unnamed dimensions are called "t0", "t1", ...
-    """
-    per_side = int(PLACES ** (1 / space.dim))
-    if per_side == 1:
-        return {}
-    sides = np.ptp(goals, axis=0)
-    step = 10 ** np.floor(np.log10(np.where(sides > 0, sides, space.sides))) / 2
-    low = space.clip(np.floor(goals.min(axis=0) / step) * step + 0.0)  # no -0 in names
-    high = space.clip(np.ceil(goals.max(axis=0) / step) * step + 0.0)
-    low, high = np.where(low < high, low, space.low), np.where(low < high, high, space.high)
-    cells = np.minimum(((goals - low) / (high - low) * per_side).astype(np.int64), per_side - 1)  # (n, outcome_dim)
-    edges = np.linspace(low, high, per_side + 1)
-    names = space.names or [f"t{k}" for k in range(space.dim)]
-    found = {}
-    for cell in np.unique(cells, axis=0):
-        bounds = [f"{edges[k, d]:.3g}..{edges[k + 1, d]:.3g}" for d, k in enumerate(cell)]
-        name = " ".join(f"{axis} {bound}" for axis, bound in zip(names, bounds, strict=True))
-        found[name] = (cells == cell).all(axis=1)
-    return found
 
 
 def of_regions(regions: Sequence[Region]) -> dict[str, float]:

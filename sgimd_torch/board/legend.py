@@ -15,7 +15,6 @@ LEGEND: Final[Mapping[str, str]] = {
     "error/noise_floor": "Part UNIT of error/mean that motor noise alone makes.",
     "error": "Mean error UNIT with the inverse model that the tag names, in place of the learner's own. All runs have "
     "error/by_linear, which compares what the learners remember, whatever their inverse models are.",
-    "met": "Share of the benchmark goals of a place whose error is at most half the side of a benchmark tile.",
     "competence": "Mean competence of the goals that a region remembers: 0 is a goal that is met, -1 an outcome no "
     "better than rest. R is all of C x T, R0 and R1 are its two parts, R01 is a part of R0; map/competence shows the "
     "regions. Each run has its own regions. After a cut of a region, its curve is the mean over its parts' goals.",
@@ -24,6 +23,7 @@ LEGEND: Final[Mapping[str, str]] = {
     "regions": "Number of regions of the goal model.",
     "regime": "Share of each kind of movement since the last point: global exploration, local optimisation, imitation, "
     "babbling, rest, or failed movements.",
+    "goals/met": "Share of the benchmark goals whose error is at most half the side of a benchmark tile.",
     "goals/reached": "Share of the last 50 goals that a movement reached within the tolerance.",
     "goals/missed_by": "Median over the last 50 goals of the distance UNIT from a goal to its nearest outcome.",
     "teacher/demonstrations": "Number of demonstrations so far.",

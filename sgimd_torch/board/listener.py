@@ -16,7 +16,7 @@ from typing import Any, Final
 
 from tensorboardX import summary
 
-from sgimd_torch.board.curves import Behaviour, of_evaluation, of_regions, places_of
+from sgimd_torch.board.curves import Behaviour, of_evaluation, of_regions
 from sgimd_torch.board.events import EventFile
 from sgimd_torch.board.legend import page, sentence
 from sgimd_torch.board.pictures import draw
@@ -48,7 +48,6 @@ class BoardListener(EventFile):
         self._config, self._learner, self._seconds, self._curves = parts.config, parts.learner, seconds, curves
         self._space: Box = parts.environment.outcomes
         self._benchmark: Benchmark = parts.benchmark
-        self._places = places_of(self._space, self._benchmark.goals)
         self._behaviour = Behaviour(parts.learner.problem.tolerance)
         self._movements = self._drawn_at = 0
         self._explained: set[str] = set()
@@ -74,7 +73,7 @@ class BoardListener(EventFile):
         """
         own, goals = found["own"], self._benchmark.goals
         others = {f"error/by_{answer}": each.mean_error for answer, each in found.items() if answer != "own"}
-        self._scalars({**of_evaluation(own, self._benchmark.side / 2, self._places), **others})
+        self._scalars({**of_evaluation(own, self._benchmark.side / 2), **others})
         if movements >= 2 * self._drawn_at or movements == self._config.movements:
             self._drawn_at = movements
             for tag, picture in draw(self._learner.regions, self._space, goals, own.errors).items():

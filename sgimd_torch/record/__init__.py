@@ -19,11 +19,12 @@ error if a row was changed, lost, doubled, moved or taken from another run.
 from __future__ import annotations
 
 import json
+import marshal
 import os
 import sqlite3
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final, Self
 
@@ -34,11 +35,8 @@ from sgimd_torch.record.layout import (
     HINT,
     SEALS,
     Dims,
-    InUseError,
     Row,
     RunError,
-    about_rows,
-    create,
     demonstration_row,
     event_reader,
     event_row,
@@ -46,13 +44,10 @@ from sgimd_torch.record.layout import (
     movements_after,
     plain,
     read_demonstration,
-    root,
-    row_bytes,
-    sealed,
 )
 from sgimd_torch.spaces import Demonstration
 
-__all__ = ["DERIVED", "Dims", "InUseError", "Record", "RunError", "layout"]
+__all__ = ["DERIVED", "Dims", "Record", "RunError", "layout"]
 
 _PATIENCE: Final = 60.0  # s, longest time that a commit waits for readers
 _AT_ONCE: Final = 4096  # number of rows that one query reads
@@ -68,7 +63,6 @@ class Record:
     Attributes:
         about: settings, versions and other facts about the run, by name; see ``settle``.
         dims: dimensions of context, theta and outcome.
-        failed: whether a write has failed; after a failure nothing is written.
 
     Raises:
         RunError: there is no record at ``path``, its header is damaged, or another process is writing it.
@@ -76,13 +70,11 @@ class Record:
 
     def __init__(self, path: str | os.PathLike[str], *, write: bool = False) -> None:
         self.path = Path(path)
-        self._waiting: dict[str, list[Row]] = {}
         self._seals: dict[str, tuple[int, int]] = {}  # by table: number of rows, seal of the last row
-        self._written: dict[str, tuple[int, int]] = {}
         self._version: Any = None  # version of the file at the last lock; each writer changes it
         self._movements = 0
         self._shown: dict[bytes, int] = {}
-        self.failed = False
+        self._lost: Exception | None = None  # the error of a failed write
         self._connection = _connect(self.path, write)
         try:
             with self._told():
@@ -101,20 +93,15 @@ class Record:
         """
         path, told = Path(path), {"run": os.urandom(8).hex(), "dims": dims, **about}
         try:
-            connection = sqlite3.connect(path, isolation_level=None)
-            try:
+            with closing(sqlite3.connect(path, isolation_level=None)) as connection, connection:
                 connection.execute("BEGIN IMMEDIATE")
-                for name, columns in layout(dims).items():
-                    connection.execute(create(name, columns))
-                connection.execute(create("seals", SEALS))
-                rows = sealed(about_rows(told), root("", "about"))
+                for statement in _tables(dims).values():
+                    connection.execute(statement)
+                rows = _sealed(_about_rows(told), _root("", "about"))
                 connection.executemany("INSERT INTO about VALUES (?, ?, ?)", rows)
-                seals = [(name, 0, root(told["run"], name)) for name in layout(dims)]
+                seals = [(name, 0, _root(told["run"], name)) for name in layout(dims)]
                 seals[0] = "about", len(rows), rows[-1][-1]
                 connection.executemany("INSERT INTO seals VALUES (?, ?, ?)", seals)
-                connection.execute("COMMIT")
-            finally:
-                connection.close()
         except sqlite3.Error as error:
             raise OSError(f"{path} cannot be written: {error}") from error
         return cls(path, write=True)
@@ -140,22 +127,20 @@ class Record:
         Raises:
             RunError: a row was changed, or rows are missing or added; all rows before it have been yielded.
         """
-        if self._waiting:
-            self._write()
-        n, seal, last = 0, self._root(table), -(2**63)
+        n, seal, last = 0, self._first_seal(table), -(2**63)
         # No cursor stays open between yields, because an open cursor locks the file, even after an error.
         next_rows = f"SELECT rowid, * FROM {table} WHERE rowid > ? ORDER BY rowid LIMIT {_AT_ONCE}"
         with self._told():
             while rows := self._connection.execute(next_rows, (last,)).fetchall():
                 last = rows[-1][0]
                 for _, *row, found in rows:
-                    seal = zlib.crc32(row_bytes(row), seal)
+                    seal = zlib.crc32(_row_bytes(row), seal)
                     if seal != found:
                         raise RunError(f"{self.path}: row {n + 1} of {table} is not what was written; {HINT}")
                     n += 1
                     yield tuple(row)
-        if (n, seal) != self._written[table]:
-            raise RunError(f"{self.path}: {table} has {n} rows, {self._written[table][0]} were written; {HINT}")
+        if (n, seal) != self._seals[table]:
+            raise RunError(f"{self.path}: {table} has {n} rows, {self._seals[table][0]} were written; {HINT}")
 
     def events(self) -> Iterator[Event]:
         """All events, in order.
@@ -183,15 +168,13 @@ class Record:
         """Replace all rows of a table."""
         with self._told(writing=True):
             self._connection.execute(f"DELETE FROM {table}")
-        self._waiting[table] = []
-        self._seals[table] = 0, self._root(table)
+        self._seals[table] = 0, self._first_seal(table)
         self._append(table, [plain(row) for row in rows])
-        self._write()
 
     def settle(self, **about: Any) -> None:
         """Add or replace entries of ``about``; json must be able to express their values."""
         self.about |= about
-        self.replace_rows("about", about_rows(self.about))
+        self.replace_rows("about", _about_rows(self.about))
 
     def commit(self) -> None:
         """Bring all new rows to the disk, or none of them.
@@ -200,8 +183,9 @@ class Record:
             OSError: the disk is full or cannot be written; earlier commits remain.
             RunError: another process has written in the meantime.
         """
-        self._write()
+        seals = [(n, seal, table) for table, (n, seal) in self._seals.items()]
         with self._told(writing=True):
+            self._connection.executemany("UPDATE seals SET n_rows = ?, seal = ? WHERE name = ?", seals)
             self._connection.execute("COMMIT")
             self._lock()
 
@@ -243,44 +227,33 @@ class Record:
         """The row number of a demonstration; a new demonstration is appended first."""
         row = demonstration_row(shown, self.dims)
         if not self._shown:
-            self._shown = {row_bytes(each): k for k, each in enumerate(self.rows("demonstrations"))}
-        key = row_bytes(row)
+            self._shown = {_row_bytes(each): k for k, each in enumerate(self.rows("demonstrations"))}
+        key = _row_bytes(row)
         if key not in self._shown:
             self._shown[key] = len(self._shown)
             self._append("demonstrations", [row])
         return self._shown[key]
 
     def _append(self, table: str, rows: Sequence[Row]) -> None:
-        n, seal = self._seals[table]
         if rows:
-            new = sealed(rows, seal)
-            self._waiting.setdefault(table, []).extend(new)
+            n, seal = self._seals[table]
+            new = _sealed(rows, seal)
+            with self._told(writing=True):
+                marks = ", ".join("?" * len(new[0]))
+                self._connection.executemany(f"INSERT INTO {table} VALUES ({marks})", new)
             self._seals[table] = n + len(new), new[-1][-1]
 
-    def _write(self) -> None:
-        """Pass the rows that wait in memory to SQLite."""
-        with self._told(writing=True):
-            for table, rows in self._waiting.items():
-                marks = ", ".join("?" * len(layout(self.dims)[table]))
-                self._connection.executemany(f"INSERT INTO {table} VALUES ({marks})", rows)
-            seals = [(*self._seals[table], table) for table in self._waiting]
-            self._connection.executemany("UPDATE seals SET n_rows = ?, seal = ? WHERE name = ?", seals)
-        self._waiting.clear()
-        self._written = dict(self._seals)
-
-    def _root(self, table: str) -> int:
-        return root("" if table == "about" else self.about["run"], table)
+    def _first_seal(self, table: str) -> int:
+        return _root("" if table == "about" else self.about["run"], table)
 
     def _open(self) -> None:
         found = dict(self._connection.execute("SELECT name, sql FROM sqlite_schema").fetchall())
         if not found:
             raise RunError("it is still empty")
-        self._written = {name: (n, seal) for name, n, seal in self._connection.execute("SELECT * FROM seals")}
-        self._seals = dict(self._written)
+        self._seals = {name: (n, seal) for name, n, seal in self._connection.execute("SELECT * FROM seals")}
         self.about: dict[str, Any] = {name: json.loads(value) for name, value in self.rows("about")}
         self.dims: Dims = tuple(self.about["dims"])
-        wanted = {name: create(name, columns) for name, columns in {**layout(self.dims), "seals": SEALS}.items()}
-        if found != wanted or self._seals.keys() != layout(self.dims).keys():
+        if found != _tables(self.dims) or self._seals.keys() != layout(self.dims).keys():
             raise RunError(f"its tables are not those of a record; {HINT}")
         last = self._connection.execute("SELECT movement, kind FROM events ORDER BY rowid DESC LIMIT 1").fetchone()
         self._movements = 0 if last is None else movements_after(*last)
@@ -297,27 +270,24 @@ class Record:
     @contextmanager
     def _told(self, *, writing: bool = False) -> Iterator[None]:
         """Turn errors of SQLite, and errors from unexpected values, into RunError or OSError with the path."""
-        if self.failed:
-            raise OSError(f"{self.path} could not be written; all rows since the last commit are lost")
+        if self._lost is not None:
+            raise self._lost
+        said: Exception
         try:
             yield
-        except RunError as error:
-            self._fail(writing)
-            raise error if str(self.path) in str(error) else RunError(f"{self.path}: {error}") from error
-        except (sqlite3.Error, ValueError, TypeError, KeyError, AttributeError, OverflowError) as error:
-            self._fail(writing)
-            if isinstance(error, sqlite3.OperationalError) and "locked" in str(error):
-                wait = "wait for it, or choose another --out"
-                raise InUseError(f"{self.path} is in use by another process; {wait}") from error
-            if writing:
-                raise OSError(f"{self.path} cannot be written: {error}") from error
-            raise RunError(f"{self.path} cannot be read as a record: {error}; {HINT}") from error
-
-    def _fail(self, writing: bool) -> None:
-        """After a failed write, never write again: the next rows would follow a gap."""
-        if writing:
-            self.failed = True
-            self._connection.close()
+        except (RunError, sqlite3.Error, ValueError, TypeError, KeyError, AttributeError, OverflowError) as error:
+            if isinstance(error, RunError):
+                said = error if str(self.path) in str(error) else RunError(f"{self.path}: {error}")
+            elif isinstance(error, sqlite3.OperationalError) and "locked" in str(error):
+                said = RunError(f"{self.path} is in use by another process; wait for it, or choose another --out")
+            elif writing:
+                said = OSError(f"{self.path} cannot be written: {error}")
+            else:
+                said = RunError(f"{self.path} cannot be read as a record: {error}; {HINT}")
+            if writing:  # the next rows would follow a gap
+                self._lost = said
+                self._connection.close()
+            raise said from error
 
 
 def _connect(path: Path, write: bool) -> sqlite3.Connection:
@@ -333,3 +303,27 @@ def _connect(path: Path, write: bool) -> sqlite3.Connection:
         return sqlite3.connect(place, uri=True, isolation_level=None, timeout=patience, check_same_thread=False)
     except (sqlite3.Error, OSError) as error:
         raise RunError(f"{path} cannot be opened: {error}") from error
+
+
+def _tables(dims: Dims) -> dict[str, str]:
+    """The statement that creates each table."""
+    every = {**layout(dims), "seals": SEALS}
+    return {name: f"CREATE TABLE {name} ({', '.join(columns)})" for name, columns in every.items()}
+
+
+def _about_rows(about: Mapping[str, Any]) -> list[Row]:
+    return [(name, json.dumps(value)) for name, value in about.items()]
+
+
+def _root(run: str, table: str) -> int:
+    """The seal with which the checksums of a table begin, before its first row."""
+    return zlib.crc32(f"{run} {table}".encode())
+
+
+def _row_bytes(row: Sequence[Any]) -> bytes:
+    """A row as bytes, for its seal. Binary floats take a fifth of the time of text."""
+    return marshal.dumps(tuple(row), 2)
+
+
+def _sealed(rows: Iterable[Row], seal: int) -> list[Row]:
+    return [(*row, seal := zlib.crc32(_row_bytes(row), seal)) for row in rows]

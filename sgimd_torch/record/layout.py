@@ -1,11 +1,8 @@
-"""The layout of a record: the columns of every table, rows as Python objects, and the seal (checksum) of each row."""
+"""The layout of a record: the columns of every table, and rows as Python objects."""
 
 from __future__ import annotations
 
-import json
-import marshal
-import zlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from itertools import accumulate, pairwise
 from typing import Any, Final
 
@@ -26,10 +23,6 @@ Row = tuple[Any, ...]
 
 class RunError(ValueError):
     """A record cannot be used: it is missing, damaged, in use, or belongs to another run."""
-
-
-class InUseError(RunError):
-    """Another process is writing the record."""
 
 
 _COUNTED: Final = (Kind.MOVED, Kind.RESTED, Kind.FAILED)  # events that count as movements
@@ -112,32 +105,6 @@ def read_demonstration(row: Row, dims: Dims) -> Demonstration:
     assert context is not None
     assert outcome is not None
     return Demonstration(context, np.frombuffer(times), np.frombuffer(trajectory).reshape(-1, n_joints), outcome)
-
-
-def root(run: str, table: str) -> int:
-    """The seal with which the checksums of a table begin, before its first row."""
-    return zlib.crc32(f"{run} {table}".encode())
-
-
-def create(name: str, columns: Sequence[str]) -> str:
-    return f"CREATE TABLE {name} ({', '.join(columns)})"
-
-
-def about_rows(about: Mapping[str, Any]) -> list[Row]:
-    return [(name, json.dumps(value)) for name, value in about.items()]
-
-
-def row_bytes(row: Sequence[Any]) -> bytes:
-    """A row as bytes, for its seal. Binary floats take a fifth of the time of text."""
-    return marshal.dumps(tuple(row), 2)
-
-
-def sealed(rows: Iterable[Row], seal: int) -> list[Row]:
-    found = []
-    for row in rows:
-        seal = zlib.crc32(row_bytes(row), seal)
-        found.append((*row, seal))
-    return found
 
 
 def _vector(name: str, dim: int) -> list[str]:

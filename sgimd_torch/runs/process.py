@@ -7,6 +7,7 @@ Exit codes: 0 done, 1 failed while running, 2 the request is wrong, 130 stopped 
 
 from __future__ import annotations
 
+import argparse
 import io
 import os
 import signal
@@ -18,7 +19,7 @@ from contextlib import AbstractContextManager, contextmanager, suppress
 from types import FrameType
 from typing import Any, Final, Self, TextIO
 
-REPORT_EVERY: Final = 10.0  # s between two lines of progress if stderr is no terminal
+REPORT_EVERY: Final = 20.0  # s between two lines of progress if stderr is no terminal
 SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
 
 
@@ -44,14 +45,14 @@ def command(main: Callable[[Sequence[str]], int], argv: Sequence[str] | None = N
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # the locale may lack signs of a name
-    code, lost = 0, None
+    code = 0
     with _on_signals(_stop):
         try:
-            code = main(sys.argv[1:] if argv is None else argv)
-        except SystemExit as end:
-            code = end.code if isinstance(end.code, int) else int(end.code is not None)
-            if code and not isinstance(end.code, int):
-                say(f"error: {end.code}")
+            try:
+                code = main(sys.argv[1:] if argv is None else argv)
+            except SystemExit as end:  # of argparse, after --help or a wrong option
+                code = int(end.code or 0)
+            sys.stdout.flush()
         except KeyboardInterrupt as stop:
             code = stop.exit_code if isinstance(stop, Stopped) else 130
         except Failed as error:
@@ -60,26 +61,27 @@ def command(main: Callable[[Sequence[str]], int], argv: Sequence[str] | None = N
         except (ValueError, ImportError) as error:
             say(f"error: {error}")
             code = 2
+        except BrokenPipeError:  # a reader such as head has seen enough
+            pass
         except OSError as error:
-            code = 2
+            code, why = 2, str(error)  # an error of this library has a complete message
             if error.filename is not None:
-                say(f"error: {error.filename} cannot be read or written: {error.strerror}")
-            elif error.errno is None:  # an error of this library, with a complete message
-                say(f"error: {error}")
-            else:  # an error of stdout or of the disk
-                lost = error
+                why = f"{error.filename} cannot be read or written: {error.strerror}"
+            elif error.errno is not None:
+                code, why = 1, f"not everything could be written: {error.strerror}"
+            say(f"error: {why}")
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()
-        except OSError as error:
+        except OSError:
             os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())  # the interpreter would complain at exit
-            lost = error if stream is sys.stdout else lost
-    if lost is not None:
-        if isinstance(lost, BrokenPipeError):
-            return 0 if code == 2 else code
-        say(f"error: not everything could be written: {lost.strerror}")
-        return 1
     return code
+
+
+def parser_of(name: str, about: str | None, **more: Any) -> argparse.ArgumentParser:
+    """A parser for the options of ``sgimd name``. Its help shows the text ``about`` with its line ends."""
+    form = argparse.RawDescriptionHelpFormatter
+    return argparse.ArgumentParser(f"sgimd {name}", description=about, formatter_class=form, allow_abbrev=False, **more)
 
 
 def _sink() -> TextIO:
@@ -114,12 +116,16 @@ def _stop(signum: int, frame: FrameType | None) -> None:
 class Stopping:
     """A context manager. In its block the first SIGINT or SIGTERM is only noted; the second one raises ``Stopped``.
 
+    Args:
+        message: text to print at the first signal.
+
     Attributes:
         heard: number of the first signal; 0 if there was none.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, message: str = "stopping after this movement; Ctrl-C once more stops at once") -> None:
         self.heard = 0
+        self._message = message
         self._block = _on_signals(self._hear)
 
     def __enter__(self) -> Self:
@@ -134,7 +140,7 @@ class Stopping:
             raise Stopped(signum)
         self.heard = signum
         with suppress(OSError):  # say() could print into a print that the signal has interrupted
-            os.write(2, b"\nstopping after this movement; Ctrl-C once more stops at once\n")
+            os.write(2, f"\n{self._message}\n".encode())
 
 
 class Progress:
@@ -144,11 +150,9 @@ class Progress:
         title: name of the work in progress.
         total: number of movements in all; the attribute may be changed later.
         done: number of movements made earlier; these do not count for the speed.
-        every: seconds between two plain lines.
     """
 
-    def __init__(self, title: str, total: int, done: int = 0, *, every: float = REPORT_EVERY) -> None:
-        self._every = every
+    def __init__(self, title: str, total: int, done: int = 0) -> None:
         self._bar: Any = None
         self.begin(title, total, done)
 
@@ -175,7 +179,7 @@ class Progress:
         self._bar.set_postfix_str(note, refresh=False)
         self._bar.update(done - self._bar.n)
         now = time.monotonic()
-        if not self._bar.disable or now - self._reported < self._every or done <= self._first:
+        if not self._bar.disable or now - self._reported < REPORT_EVERY or done <= self._first:
             return
         self._reported = now
         rate = (done - self._first) / (now - self._begun)

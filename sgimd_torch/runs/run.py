@@ -6,25 +6,25 @@ print(carry_out(build(Config(seed=3)), stopping, resume=False, accept_loss=False
 from __future__ import annotations
 
 import math
-import re
 import time
 import traceback
-from collections.abc import Iterator
-from contextlib import suppress
-from typing import Final, Self
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from functools import partial
+from typing import Final, Protocol, Self
 
 from sgimd_torch.environments.protocol import FAILURES, SimulationError
+from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.record import RunError
 from sgimd_torch.record.replay import ReplayError
 from sgimd_torch.runs.build import RunParts
 from sgimd_torch.runs.directory import open_run
 from sgimd_torch.runs.evaluations import Evaluations
-from sgimd_torch.runs.listeners import Listener, Seconds
 from sgimd_torch.runs.process import Failed, Progress, Stopped, Stopping, say
 from sgimd_torch.session import NoOutcomeError, live, reason_of, run
 from sgimd_torch.spaces import Episode
 
-TOLD: Final = 3  # first failures, with a message each; a later failure has a message only if it is of a new kind
+TOLD: Final = 3  # first failures, with a message each; later ones are only counted
 COMMIT_EVERY: Final = 1.0  # s between two commits; a killed run loses the movements since the last commit
 
 
@@ -93,7 +93,6 @@ class Life:
             board = BoardListener(parts.config.directory, parts, self.seconds.summary, self._curves)
             self.listeners.append(board)
         self._wanted = set(parts.config.evaluations)
-        self._failures: list[str] = []  # kinds of failures that had a message
         self._committed = time.monotonic()
 
     def __enter__(self) -> Self:
@@ -107,7 +106,7 @@ class Life:
     def close(self, *, keep: bool = True) -> None:
         """Close record and listeners; ``keep`` commits the last movements first."""
         try:
-            if keep and not self.replaying and not self.record.failed:
+            if keep and not self.replaying:
                 self._settle()
         finally:
             self.record.close()
@@ -159,13 +158,14 @@ class Life:
             movements=parts.config.movements,
             teacher=parts.teacher,
             teachers=parts.teachers,
-            execute=self.seconds.of_physics(live(parts.environment, seed)),
+            execute=self.seconds.of("physics")(live(parts.environment, seed)),
             record=self.record,
             failures=parts.config.failures or FAILURES,
         )
         if not self.recorded:
             self._begin()
-        for episode in self.seconds.of_learner(episodes):
+        following = self.seconds.of("learner")(partial(next, episodes, None))
+        for episode in iter(following, None):
             self._after(episode)
             yield episode
 
@@ -189,11 +189,9 @@ class Life:
         self.movements = episode.index + 1
         if episode.failed:
             self.failed += 1
-            kind = re.sub(r"\d", "", episode.failed)
-            if not replayed and (len(self._failures) < TOLD or kind not in self._failures):
-                more = "; from now on such failures are only counted" if len(self._failures) == TOLD - 1 else ""
+            if not replayed and self.failed <= TOLD:
+                more = "; further failures are only counted" if self.failed == TOLD else ""
                 say(f"movement {episode.index} failed: {episode.failed}{more}")
-                self._failures.append(kind)
         for each in self.listeners:
             each.episode(episode, replayed)
         if self.movements in self._wanted:
@@ -218,3 +216,61 @@ class Life:
         for each in self.listeners:
             each.begin()
         self.commit()
+
+
+class Listener(Protocol):
+    """Listener of a run; it overrides the methods that it needs.
+
+    A resumed run first tells its listeners everything that is in the record.
+    """
+
+    def episode(self, episode: Episode, replayed: bool) -> None:
+        """A movement was made, or replayed."""
+        return
+
+    def evaluated(self, movements: int, found: Mapping[str, Evaluation]) -> None:
+        """The learner was evaluated after ``movements`` movements; ``found`` is by name of the inverse model."""
+        return
+
+    def begin(self) -> None:
+        """The replay of the record is over; before this call, a listener must not change files."""
+        return
+
+    def curves(self) -> Mapping[str, float]:
+        """New numbers for the board since the last call, by tag."""
+        return {}
+
+    def flush(self) -> None:
+        """Write everything to the disk that is still in memory."""
+        return
+
+    def close(self) -> None:
+        """The run has ended, or was stopped."""
+        return
+
+
+class Seconds:
+    """Seconds spent so far, by part of the run.
+
+    Args:
+        before: seconds of the resumed run; physics and evaluation continue from there, as a replay skips both.
+    """
+
+    def __init__(self, before: Mapping[str, float]) -> None:
+        self._spent = {part: before.get(f"seconds_{part}", 0.0) for part in ("physics", "evaluation")}
+        self._spent["learner"] = self._within = 0.0
+
+    @contextmanager
+    def of(self, part: str) -> Iterator[None]:
+        """Add the time of a block or decorated function to a ``part``; blocks within it count for their own parts."""
+        begun, around, self._within = time.perf_counter(), self._within, 0.0
+        try:
+            yield
+        finally:
+            passed = time.perf_counter() - begun
+            self._spent[part] = self._spent.get(part, 0.0) + passed - self._within
+            self._within = around + passed
+
+    def summary(self) -> dict[str, float]:
+        """Seconds by name, as the record stores them."""
+        return {f"seconds_{part}": round(seconds, 3) for part, seconds in self._spent.items()}

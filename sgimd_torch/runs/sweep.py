@@ -8,7 +8,6 @@ of a variant with seed 3 goes to OUT/NAME/seed-003. NAME lists the varied values
   sgimd sweep --vary algorithm=sagg-riac,sgim-d --vary budget=5,15 --seeds 0-4 --movements 2000 --out study
   sgimd sweep --vary environment.noise=0,0.03 --seeds 0,3,7-9 --out study --dry-run    list unfinished runs
   sgimd sweep --vary goals=interest-map,uniform --seeds 0-19 --shard 2/4   the second quarter of the list of runs
-  sgimd sweep --vary goals=interest-map,uniform --seeds 0-999 --engine ray --address auto        on a cluster
   sgimd table study                                                        show the results
 
 Repeat the command after Ctrl-C or a power cut, or with more seeds: finished runs are kept, unfinished ones continue.
@@ -25,16 +24,15 @@ import os
 import re
 import sys
 from collections.abc import Sequence
-from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
 from typing import Final, NamedTuple, TypeVar
 
 from sgimd_torch.files import make_folder
 from sgimd_torch.runs.command_line import parse
-from sgimd_torch.runs.config import FILES, Config, code_of, dashed
-from sgimd_torch.runs.engines.loop import Submit, local, sweep
-from sgimd_torch.runs.process import loading, say
+from sgimd_torch.runs.config import Config, dashed
+from sgimd_torch.runs.parallel import sweep
+from sgimd_torch.runs.process import loading, parser_of, say
 from sgimd_torch.runs.read import finished, movements_on_disk
 
 Item = TypeVar("Item")
@@ -47,16 +45,11 @@ NOT_VARIED: Final = {
 
 def parser() -> argparse.ArgumentParser:
     """The options of ``sgimd sweep``."""
-    parser = argparse.ArgumentParser(
-        prog="sgimd sweep",
-        usage="%(prog)s [--vary OPTION=VALUE,VALUE ...] [--seeds SEEDS] [--OPTION VALUE ...]",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
+    parser = parser_of(
+        "sweep", __doc__, usage="%(prog)s [--vary OPTION=VALUE,VALUE ...] [--seeds SEEDS] [--OPTION VALUE ...]"
     )
     add_vary(parser)
     add_options(parser, seeds="0")
-    add_engines(parser)
     return parser
 
 
@@ -73,7 +66,7 @@ def carry_out(whole: Sequence[Config], options: argparse.Namespace, flags: Seque
 
     Args:
         whole: all runs of the study.
-        options: parsed options of ``add_options`` and ``add_engines``.
+        options: parsed options of ``add_options``.
         flags: flags of ``sgimd run`` for all runs, besides --resume.
         out: folder of the study.
 
@@ -92,9 +85,8 @@ def carry_out(whole: Sequence[Config], options: argparse.Namespace, flags: Seque
         from sgimd_torch.runs.build import build  # imported here so that --help is fast
     for config in {each.directory.parent: each for each in left}.values():
         build(config)  # wrong options raise an error before any run starts
-    with engine_of(options, left) as submit:
-        make_folder(out)
-        failures = sweep(left, submit, flags=flags)
+    make_folder(out)
+    failures = sweep(left, options.processes, flags=flags)
     say(f"{len(left) - len(failures)} runs ended well, {len(failures)} failed: {out}", *failures)
     return 1 if failures else 0
 
@@ -111,7 +103,7 @@ def add_vary(parser: argparse.ArgumentParser) -> None:
 
 
 def add_options(parser: argparse.ArgumentParser, *, seeds: str | None, default: str = "%(default)s") -> None:
-    """Add the options of every command with many runs: --seeds, --processes and --dry-run.
+    """Add the options of every command with many runs: --seeds, --shard, --processes and --dry-run.
 
     Args:
         parser: parser to extend.
@@ -119,12 +111,6 @@ def add_options(parser: argparse.ArgumentParser, *, seeds: str | None, default: 
         default: description of these seeds in the help text.
     """
     parser.add_argument("--seeds", type=_seeds, default=seeds, help=f"seeds: 5, 0-19 or 0,3,7-9 (default: {default})")
-    parser.add_argument("--processes", type=_count, help="number of runs at a time (default: one for each core)")
-    parser.add_argument("--dry-run", action="store_true", help="list unfinished runs without starting them")
-
-
-def add_engines(parser: argparse.ArgumentParser) -> None:
-    """Add the options that say where runs are carried out: --shard, --engine and --address."""
     parser.add_argument(
         "--shard",
         type=_shard,
@@ -132,48 +118,11 @@ def add_engines(parser: argparse.ArgumentParser) -> None:
         metavar="K/N",
         help="part K of N equal parts of the list of runs, for a job array (default: %(default)s)",
     )
+    cores = len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
     parser.add_argument(
-        "--engine",
-        choices=("local", "ray"),
-        default="local",
-        help="local: processes of this machine; ray: tasks of a Ray cluster (extra ray) (default: %(default)s)",
+        "--processes", type=_count, default=cores, help="number of runs at a time (default: one for each core)"
     )
-    parser.add_argument(
-        "--address",
-        metavar="HOST:PORT",
-        help="address of the Ray cluster of this machine; auto: search for it (default: start a cluster here)",
-    )
-
-
-def engine_of(options: argparse.Namespace, configs: Sequence[Config]) -> AbstractContextManager[Submit]:
-    """The engine that the parsed ``options`` choose for these runs; it is not started yet.
-
-    Raises:
-        ValueError: the options contradict each other.
-        ImportError: Ray is not installed.
-    """
-    if options.engine == "local" and options.address is not None:
-        raise ValueError(f"--address {options.address} names a Ray cluster; add --engine ray")
-    if options.address is not None and options.processes is not None:
-        raise ValueError("--processes cannot be combined with --address: a cluster uses all of its cores")
-    processes = options.processes or (len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1)
-    if options.engine == "local" or not configs:  # an empty list needs no cluster
-        return local(processes)
-    for config in configs:
-        if config.board:
-            raise ValueError("--board true cannot be combined with --engine ray, which returns no event files")
-        for path in (config[name] for name in FILES):
-            if path is not None and (path.is_absolute() or ".." in path.parts):
-                raise ValueError(f"--engine ray sends only files of the working directory; copy {path} there")
-    try:
-        with loading():
-            from sgimd_torch.runs.engines.on_ray import on_ray  # a slow import
-    except ModuleNotFoundError as error:
-        hint = "pip install 'sgimd-torch[ray]' installs it"
-        raise ImportError(f"--engine ray needs {error.name}, which is not installed; {hint}") from error
-    return on_ray(
-        options.address, processes, ships=any(code_of(config.settings) for config in configs), out=configs[0].out
-    )
+    parser.add_argument("--dry-run", action="store_true", help="list unfinished runs without starting them")
 
 
 class Shard(NamedTuple):

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Final
 from sgimd_torch.record.replay import ReplayError
 from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.process import Failed, loading, say
+from sgimd_torch.runs.process import Failed, loading, parser_of, say
 from sgimd_torch.runs.read import config_of, read_run
 from sgimd_torch.session import NoOutcomeError
 from sgimd_torch.teach.by_hand import BY_HAND
@@ -89,13 +89,7 @@ def serving(port: int, token: str) -> Iterator[ViserServer]:
 
 def parser() -> argparse.ArgumentParser:
     """The options of ``sgimd teach``."""
-    parser = argparse.ArgumentParser(
-        prog="sgimd teach",
-        usage="sgimd teach [RUN | options of sgimd run] [--port N]",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
-    )
+    parser = parser_of("teach", __doc__, usage="sgimd teach [RUN | options of sgimd run] [--port N]")
     parser.add_argument("--port", type=int, default=8080, help="first port to try (default: 8080)")
     parser.add_argument("--trust", action="store_true", help="execute the user's code that the settings of RUN name")
     return parser

@@ -25,7 +25,7 @@ from pathlib import Path
 import numpy as np
 
 from sgimd_torch.evaluation import TILES, Benchmark, save_benchmark, tile_goals, tile_side
-from sgimd_torch.runs.process import say
+from sgimd_torch.runs.process import parser_of, say
 from sgimd_torch.runs.read import Run, find_runs, read_run
 from sgimd_torch.spaces import Box, check_count, stream
 
@@ -77,9 +77,7 @@ def _reached_by(runs: Sequence[Run]) -> tuple[str, Box]:
 
 def parser() -> argparse.ArgumentParser:
     """The options of ``sgimd benchmark``."""
-    parser = argparse.ArgumentParser(
-        prog="sgimd benchmark", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = parser_of("benchmark", __doc__)
     parser.add_argument(
         "runs", type=Path, nargs="+", metavar="RUNS", help="folder of a run, of a variant or of variants"
     )

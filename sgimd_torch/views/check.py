@@ -32,6 +32,7 @@ from sgimd_torch.environments.check import check_environment
 from sgimd_torch.environments.protocol import Environment, execute_many
 from sgimd_torch.runs.build import task_of
 from sgimd_torch.runs.config import Config
+from sgimd_torch.runs.process import parser_of
 from sgimd_torch.runs.tasks import Task, benchmark_of, demonstrations_of
 from sgimd_torch.spaces import check_count, stream
 from sgimd_torch.views.demonstrations import check
@@ -42,9 +43,7 @@ NARROW = 0.03  # share of the volume of T; if the outcomes of random movements s
 
 def parser() -> argparse.ArgumentParser:
     """The options of ``sgimd check``."""
-    parser = argparse.ArgumentParser(
-        prog="sgimd check", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = parser_of("check", __doc__)
     parser.add_argument("environment", metavar="ENVIRONMENT", help="name such as fishing-rod, or mypackage.toss:make")
     parser.add_argument("--movements", type=int, default=3, metavar="N", help="random movements (default: %(default)s)")
     return parser

@@ -31,8 +31,8 @@ from sgimd_torch.catalogue import ROD
 from sgimd_torch.figures.names import label
 from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.engines.loop import local, sweep
-from sgimd_torch.runs.process import Failed, loading, say
+from sgimd_torch.runs.parallel import sweep
+from sgimd_torch.runs.process import Failed, loading, parser_of, say
 from sgimd_torch.runs.read import finished, read_run
 
 LEARNERS: Final = {
@@ -63,9 +63,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     say(f"{len(configs)} learners, {base.movements} movements each, seed {base.seed}, two at a time: {base.out}")
     say(*(f"{label(algorithm)} {does}" for algorithm, does in LEARNERS.items()))
     longest_first = [config for config in reversed(configs.values()) if not finished(config)]
-    with local(processes=2) as submit:
-        failures = sweep(longest_first, submit)
-    if failures:
+    if failures := sweep(longest_first, processes=2):
         raise Failed("\n".join(failures))
     variants = [Variant(name, [read_run(config.directory)]) for name, config in configs.items()]
     (figure,) = save_figure(partial(figure_of_curves, variants), base.out / "demo", "png")
@@ -100,10 +98,4 @@ def configs_of(rest: Sequence[str]) -> dict[str, Config]:
 
 def parser() -> argparse.ArgumentParser:
     """The options of ``sgimd demo``."""
-    return argparse.ArgumentParser(
-        prog="sgimd demo",
-        usage="%(prog)s [--OPTION VALUE ...]",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
-    )
+    return parser_of("demo", __doc__, usage="%(prog)s [--OPTION VALUE ...]")

@@ -35,6 +35,7 @@ from sgimd_torch.demonstrations.fit import beyond_limits, misfit_of
 from sgimd_torch.environments.protocol import SimulationError, execute_many
 from sgimd_torch.runs.build import task_of
 from sgimd_torch.runs.config import Config
+from sgimd_torch.runs.process import parser_of
 from sgimd_torch.runs.tasks import Task, correspondence_of
 from sgimd_torch.spaces import Array, Demonstration, stream
 from sgimd_torch.views.text_table import print_table
@@ -82,7 +83,7 @@ def parser() -> argparse.ArgumentParser:
     )
     source.add_argument("--degrees", action="store_true", help="convert joints from degrees to radians")
     shown: dict[str, Any] = {"description": __doc__, "formatter_class": argparse.RawDescriptionHelpFormatter}
-    parser = argparse.ArgumentParser(prog="sgimd demonstrations", **shown)
+    parser = parser_of("demonstrations", __doc__)
     commands = parser.add_subparsers(dest="command", required=True, metavar="check|import")
     checked = commands.add_parser("check", help="execute recordings on a robot", parents=[source], **shown)
     checked.add_argument(

@@ -26,8 +26,9 @@ from typing import Any, Final
 
 from sgimd_torch.catalogue import ROD
 from sgimd_torch.runs.config import Config
+from sgimd_torch.runs.process import parser_of
 from sgimd_torch.runs.read import finished
-from sgimd_torch.runs.sweep import add_engines, add_options, add_vary, carry_out, variants_of
+from sgimd_torch.runs.sweep import add_options, add_vary, carry_out, variants_of
 
 
 @dataclass(frozen=True)
@@ -134,14 +135,8 @@ def titled(task: str) -> str:
 
 def parser() -> argparse.ArgumentParser:
     """The options of ``sgimd suite``."""
-    parser = argparse.ArgumentParser(
-        prog="sgimd suite",
-        usage="%(prog)s [--tasks TASK ...] [--vary OPTION=VALUE,VALUE ...] [--seeds SEEDS] [--OPTION VALUE ...]",
-        description=__doc__,
-        epilog="tasks: " + ", ".join(map(titled, TASKS)),
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
-    )
+    usage = "%(prog)s [--tasks TASK ...] [--vary OPTION=VALUE,VALUE ...] [--seeds SEEDS] [--OPTION VALUE ...]"
+    parser = parser_of("suite", __doc__, usage=usage, epilog=f"tasks: {', '.join(map(titled, TASKS))}")
     parser.add_argument(
         "--tasks",
         nargs="+",
@@ -152,7 +147,6 @@ def parser() -> argparse.ArgumentParser:
     )
     add_vary(parser)
     add_options(parser, seeds="0")
-    add_engines(parser)
     return parser
 
 

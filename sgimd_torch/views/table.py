@@ -27,7 +27,7 @@ from pathlib import Path
 import numpy as np
 
 from sgimd_torch.record import RunError
-from sgimd_torch.runs.process import say
+from sgimd_torch.runs.process import parser_of, say
 from sgimd_torch.runs.read import Run
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.statistics import LEAST_SEEDS, show
@@ -37,11 +37,7 @@ from sgimd_torch.views.variants import EARLY, Variant, baseline_of, best_first, 
 
 def parser() -> argparse.ArgumentParser:
     """The options of ``sgimd table``."""
-    parser = argparse.ArgumentParser(
-        prog="sgimd table",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = parser_of("table", __doc__)
     parser.add_argument("runs", type=Path, metavar="RUNS", help="folder of runs, of a variant or of variants")
     parser.add_argument("--at", type=int, metavar="MOVEMENTS", help="number of movements at which to compare")
     parser.add_argument("--baseline", metavar="NAME", help="variant to compare the others with, seed by seed")

@@ -257,10 +257,9 @@ def test_of_two_teachers_each_is_asked_in_their_own_half():
     assert np.mean(own) > 0.8
 
 
-def test_sgim_im_asks_one_teacher_and_imitates_what_it_is_shown():
+def test_sgim_im_imitates_what_it_is_shown_and_never_emulates():
     teachers = {"all": AnsweringTeacher(SHOWN, stream(0, "t"))}
-    learner = sgim_im(ARM, 0, correspondence=last_posture, teachers=teachers)
-    asked = [e for e in live(learner, teachers) if e.reply == "shown"]
-    assert {e.move.origin for e in asked} == {"imitate"}
-    with pytest.raises(ValueError, match="sgim_im asks one teacher, got 2; is sgim_acts meant"):
-        sgim_im(ARM, 0, correspondence=last_posture, teachers=halves())
+    learner = sgim_im(ARM, 0, correspondence=last_posture, teachers=teachers, budget=5)
+    asked = [e for e in live(learner, teachers) if e.request]
+    assert {e.request.strategy for e in asked} == {"imitate all"}
+    assert {e.move.origin for e in asked if e.reply == "shown"} == {"imitate"}

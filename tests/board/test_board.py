@@ -18,10 +18,10 @@ from boards import board_of, curves_of, pictures_of
 from runs import arguments, content_of, end, stopped_at
 from sgimd_torch import InterestMap, stream
 from sgimd_torch.board import pictures
-from sgimd_torch.board.curves import Behaviour, branches, of_evaluation, of_regions, places_of
+from sgimd_torch.board.curves import Behaviour, branches, of_evaluation, of_regions
 from sgimd_torch.board.events import EventFile
 from sgimd_torch.board.legend import LEGEND
-from sgimd_torch.evaluation import Evaluation, load_benchmark
+from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.figures.sections import sections
 from sgimd_torch.runs import sweep
 from sgimd_torch.runs.command_line import main
@@ -114,36 +114,9 @@ def test_a_region_that_was_cut_goes_on_as_the_mean_over_the_goals_of_its_parts()
     assert values["regions/count"] == len(regions)
 
 
-@pytest.mark.parametrize(("dim", "n"), [(1, 4), (2, 4)])
-def test_places_are_at_most_four_and_hold_each_goal_once_the_border_included(dim, n):
-    goals = np.vstack((np.zeros(dim), np.ones(dim), stream(0, "test").random((500, dim))))
-    places = places_of(Box.cube(-5, 5, dim), goals)
-    assert len(places) == n
-    assert all(name.count("..") == dim for name in places)
-    assert (np.sum(list(places.values()), axis=0) == 1).all()
-
-
-def test_a_task_space_of_three_dimensions_and_more_has_no_places():
-    assert places_of(Box.cube(0, 1, 3), np.eye(3)) == {}
-
-
-def test_places_lie_where_the_goals_of_the_benchmark_do_so_that_task_spaces_of_any_size_have_the_same():
-    goals = load_benchmark().goals
-    names = {"x -1..0 y -1..0", "x -1..0 y 0..1", "x 0..1 y -1..0", "x 0..1 y 0..1"}
-    for half_side in (1.0, 10.0, 100.0):
-        assert places_of(Box.cube(-half_side, half_side, 2, names=("x", "y")), goals).keys() == names
-    small = places_of(Box(np.array([0.0, -1]), np.array([0.8, 1])), np.array([[0.1, 0], [0.79, 0]]))
-    assert list(small) == ["t0 0.1..0.45 t1 0..1", "t0 0.45..0.8 t1 0..1"]  # goals alike in t1 leave all of it
-
-
-def test_the_share_of_goals_met_is_counted_by_place_and_everywhere():
-    goals = np.array([[-0.9, -0.9], [-0.8, -0.9], [0.5, 0.5], [0.9, 0.9]])
-    values = of_evaluation(evaluation([0.01, 0.2, 0.05, 0.0]), 0.05, places_of(PLANE, goals))
-    assert values["met/everywhere"] == 0.75
-    assert {tag: share for tag, share in values.items() if "x" in tag} == {
-        "met/x -1..0 y -1..0": 0.5,
-        "met/x 0..1 y 0..1": 1,
-    }  # and of no place without goals
+def test_the_share_of_goals_met_is_counted():
+    values = of_evaluation(evaluation([0.01, 0.2, 0.05, 0.0]), 0.05)
+    assert values["goals/met"] == 0.75
     assert (values["error/mean"], values["error/noise_floor"]) == pytest.approx((0.065, 0.01))
 
 
@@ -215,7 +188,7 @@ def test_the_curves_of_a_run_are_those_of_its_record(watched):
 def test_other_readers_find_every_curve(watched):
     found = pytest.importorskip("tbparse").SummaryReader(str(watched)).scalars
     assert set(found.tag) == curves_of(watched).keys()
-    assert {"error/mean", "error/by_linear", "met/x_-0.4..-0.05_y_0.4..0.5", "competence/R"} < set(found.tag)
+    assert {"error/mean", "error/by_linear", "goals/met", "competence/R"} < set(found.tag)
 
 
 def test_every_tag_is_explained_in_the_file_with_its_unit_and_in_the_legend(watched):

@@ -9,12 +9,13 @@ import pytest
 
 from compare import RUN, collect, compared, last_rows, main, runs_of
 from made_up import row, write
-from runs import ROOT, start, sweep_here
+from runs import ROOT, start
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.record import RunError
 from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.config import Config, words
+from sgimd_torch.runs.parallel import sweep
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import Run, read_run
 from table import CORNER, explored_rows, merge, read_table, result_rows, task_name, tiles_reached
@@ -26,6 +27,7 @@ import sys
 sys.path.insert(0, "EXPERIMENTS")
 import variants
 from pathlib import Path
+from sgimd_torch.runs.parallel import sweep
 from sgimd_torch.runs.process import command
 tiny = dict(movements=40, evaluate_at=(20,), repeats=2, benchmark=Path(sys.argv.pop(1)))
 variants.EXPERIMENTS.clear()
@@ -304,7 +306,7 @@ def test_rows_are_drawn_by_lot_and_made_again_in_a_folder_of_their_own(tmp_path,
     monkeypatch.chdir(tmp_path)
     config = Config(algorithm="sgim-d", name="sgim-d-arm-7", movements=20, parts={"environment": "planar-arm-7"})
     again = replace(config, evaluate_at=(20,), floor_at=(), evaluated_by=("own",), out=tmp_path / "first")
-    assert sweep_here([again]) == []
+    assert sweep([again], processes=1) == []
     made = result_rows("planar-arm-7", again, read_run(again.directory))
     merge(tmp_path, "results.csv", [made[-1], {**made[-1], "seed": 1, "error": 0.5}])
     words = ["planar-arm-7", "--only", "sgim-d-arm-7", "--seeds", "0-1", "--results", ".", "--processes", "1"]

@@ -9,7 +9,6 @@ from runs import ROOT, content_of
 # Before its 20th movement, the arm does what the environment variable AT_20 names, a key of WAYS.
 ROBOT = """
 import os, signal
-from pathlib import Path
 import numpy as np
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import Benchmark
@@ -22,22 +21,10 @@ def stop_the_sweep():
     os.kill(os.getppid(), int(os.environ["SIGNAL"]))
     os.read(heard, 1)  # until the sweep's own signal has come
 
-def stop_the_sweep_far_away():
-    os.kill(int(Path(os.environ["MARK"]).read_text()), signal.SIGINT)
-    signal.pause()
-
-def kill_the_task_once():
-    mark = Path(os.environ["MARK"])
-    if not mark.read_text().startswith("killed"):
-        mark.write_text("killed")
-        os.kill(os.getppid(), signal.SIGKILL)
-
 WAYS = {
     "": lambda: None,
     "dies": lambda: os.kill(os.getpid(), signal.SIGKILL),
     "stops the sweep": stop_the_sweep,
-    "stops the sweep far away": stop_the_sweep_far_away,
-    "kills the task once": kill_the_task_once,
 }
 
 class Arm(PlanarArm):

@@ -65,14 +65,6 @@ def files_of(directory):
     return {path.name: path.read_bytes() for path in directory.iterdir()}
 
 
-def sweep_here(configs, processes=1, **options):
-    """Carry out runs in processes of this machine; returns the failures."""
-    from sgimd_torch.runs.engines.loop import local, sweep
-
-    with local(processes) as submit:
-        return sweep(configs, submit, **options)
-
-
 def start(program, *options, limit=""):
     """Start a program in another process; ``limit`` are options of ``ulimit``."""
     paths = [str(ROOT), os.environ.get("PYTHONPATH", "")]

@@ -76,7 +76,7 @@ sys.meta_path.insert(0, Absent())
 def test_the_demo_needs_no_more_than_its_setup_installs(tmp_path):
     extras = re.search(r'^demo\) extras="(.*?)"', (ROOT / "scripts/setup").read_text(), re.MULTILINE)[1].split(",")
     needed = closure(required(*extras))
-    assert not needed & {"torch", "ray", "playwright", "viser"}
+    assert not needed & {"torch", "playwright", "viser"}
     absent = {
         module
         for module, names in importlib.metadata.packages_distributions().items()

@@ -56,7 +56,6 @@ LIBRARIES = {  # rooms or single files that may import a library, by library
     "sklearn": {"rivals"},
     "ribs": {"rivals"},
     "pyarrow": {"demonstrations/lerobot"},
-    "ray": {"runs/engines/on_ray"},
     "gymnasium": {"environments/from_gymnasium", "environments/to_gymnasium"},
 }
 WORLDS = {"environments"}

@@ -15,7 +15,7 @@ from sgimd_torch.runs.directory import FILE
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.tasks.robots import arm_benchmark, arm_demonstrations
-from sgimd_torch.spaces import Demonstration, stream
+from sgimd_torch.spaces import stream
 
 NO_CONTEXT = np.empty(0)
 ALGORITHMS = WORDS["algorithm"]
@@ -140,18 +140,13 @@ def test_own_demonstrations_and_goals_replace_those_of_the_arm(tmp_path, capsys)
     [
         ("planar-arm-7", ["--benchmark", "{rod}"], "the benchmark was made for the class FishingRod .* got PlanarArm"),
         ("planar-arm-50", ["--demonstrations", "{seven}"], r"seven.npz: recording 0 .*shape \(..., 50\), got \(5, 7\)"),
-        ("planar-arm-7", ["--demonstrations", "{degrees}"], "recording 0 cannot be translated: .* is it in deg"),
         ("fishing-rod", ["--demonstrations", "{seven}"], r"seven.npz: recording 0 .*shape \(..., 6\), got \(5, 7\)"),
     ],
 )
 def test_files_of_another_robot_are_refused(tmp_path, benchmark, capsys, environment, options, message):
-    shown = arm_demonstrations(PlanarArm())
-    seven, degrees = tmp_path / "seven.npz", tmp_path / "degrees.npz"
-    save_demonstrations(seven, shown)
-    save_demonstrations(
-        degrees, [Demonstration(s.context, s.times, np.degrees(s.trajectory), s.outcome) for s in shown]
-    )
-    options = [option.format(rod=benchmark, seven=seven, degrees=degrees) for option in options]
+    seven = tmp_path / "seven.npz"
+    save_demonstrations(seven, arm_demonstrations(PlanarArm()))
+    options = [option.format(rod=benchmark, seven=seven) for option in options]
     assert live(tmp_path / "out", "--environment", environment, *options) == 2
     errors = capsys.readouterr().err
     assert re.search(message, errors)

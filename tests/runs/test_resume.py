@@ -122,14 +122,13 @@ def test_a_run_made_longer_executes_nothing_again_for_its_evaluations(tmp_path, 
     assert content_of(tmp_path / "sgim-d" / "seed-003") == reference
 
 
-@pytest.mark.parametrize("algorithm", ["sgim-d", "observation"])
-def test_a_finished_run_made_longer_equals_a_long_run(tmp_path, go, algorithm):
-    options = ("--algorithm", algorithm)
+def test_a_finished_run_made_longer_equals_a_long_run(tmp_path, go):
+    options = ("--algorithm", "observation")
     assert go(tmp_path / "long", *options) == 0
     assert go(tmp_path / "extended", *options, "--movements", 50) == 0  # evaluated after 50, which the long one is not
     assert go(tmp_path / "extended", *options, "--resume") == 0
-    extended = tmp_path / "extended" / algorithm / "seed-003"
-    assert content_of(extended) == content_of(tmp_path / "long" / algorithm / "seed-003")
+    extended = tmp_path / "extended/observation/seed-003"
+    assert content_of(extended) == content_of(tmp_path / "long/observation/seed-003")
     assert read_run(extended).config["movements"] == MOVEMENTS
 
 

@@ -1,24 +1,21 @@
 """Many runs at once: which runs a command line means, what is left to do, and how runs can fail.
 
-Most of the loop is tried with an engine that starts nothing; what processes do to each other, with a robot that stops
-itself, so that no test waits for a clock.
+What processes do to each other is tried with a robot that stops itself, so that no test waits for a clock.
 """
 
 import os
 import re
 import shutil
 import signal
-from concurrent.futures import Future
 from pathlib import Path
 
 import pytest
 
 from odd import ODD, SWEEP, as_alone, odd_place, said_by
-from runs import content_of, start, sweep_here
-from sgimd_torch.demonstrations import SHIPPED
+from runs import content_of, start
+from sgimd_torch.runs import parallel
 from sgimd_torch.runs.command_line import main as run
 from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.engines import loop
 from sgimd_torch.runs.process import Failed, command
 from sgimd_torch.runs.read import finished, movements_on_disk
 from sgimd_torch.runs.sweep import main, variants_of
@@ -93,16 +90,6 @@ def test_shards_are_consecutive_parts_of_the_list_and_together_the_whole(tmp_pat
     assert "2 runs, shard 3/4 of 10 runs, 0 of them finished: runs" in said
 
 
-def test_without_ray_the_extra_that_brings_it_is_named(tmp_path):
-    program = f"import sys; sys.modules['ray'] = None; {SWEEP}"
-    process = start(program, *SHORT, "--engine", "ray", "--out", tmp_path / "study")
-    _, said = process.communicate()
-    assert process.returncode == 2
-    slip = "pip install 'sgimd-torch[ray]' installs it"
-    assert said.splitlines()[-1] == f"error: --engine ray needs ray, which is not installed; {slip}"
-    assert not (tmp_path / "study").exists()
-
-
 def test_every_run_is_what_it_would_be_alone_and_a_second_start_does_nothing(tmp_path, capsys):
     options = [*ALONE, "--vary", "algorithm=random,sagg-riac", "--processes", 2, "--out", tmp_path / "study"]
     assert swept(*options) == 0
@@ -135,50 +122,45 @@ def test_a_file_of_goals_that_has_changed_makes_a_run_unfinished(benchmark, tmp_
     assert not finished(config)
 
 
-def ended(error=None):
-    future = Future()
-    future.set_result(None) if error is None else future.set_exception(error)
-    return future
-
-
 def test_failures_are_named_in_the_order_of_the_list_and_the_others_go_on(tmp_path):
-    errors = {1: ValueError("refused"), 3: Failed("broke"), 4: OSError("no disk")}
-    configs, ended_well = [short(tmp_path, seed=seed) for seed in range(5)], []
+    configs, ended_well = [short(tmp_path, seed=seed) for seed in range(4)], []
+    for seed in (1, 3):
+        configs[seed].directory.parent.mkdir(parents=True, exist_ok=True)
+        configs[seed].directory.write_text("a file in the place of a folder")
 
     def on_end(config):
         ended_well.append(config.seed)
         if config.seed == 2:
             raise ValueError("its rows are damaged")
 
-    failures = loop.sweep(configs, lambda config, flags: ended(errors.get(config.seed)), on_end=on_end)
-    assert failures == [
-        *("random seed 1 failed: refused", "random seed 2 failed: its rows are damaged"),
-        *("random seed 3 failed: broke", "random seed 4 failed: no disk"),
-    ]
+    failures = parallel.sweep(configs, processes=2, on_end=on_end)
+    assert failures[1] == "random seed 2 failed: its rows are damaged"
+    for failure, seed in zip(failures[::2], (1, 3), strict=True):
+        assert re.match(f"random seed {seed} failed: .*seed-00{seed} cannot be made", failure)
     assert sorted(ended_well) == [0, 2]
 
 
 def test_two_runs_with_one_directory_are_refused(tmp_path):
     with pytest.raises(ValueError, match=r"two runs would be written to .*seed-000"):
-        sweep_here([short(tmp_path), short(tmp_path, inverse="nearest")])
+        parallel.sweep([short(tmp_path), short(tmp_path, inverse="nearest")], processes=1)
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(
-    ("code", "said", "error", "words"),
+    ("code", "said", "words"),
     [
-        (2, "reading\nerror: no such goal\nmore on it\n", ValueError, "no such goal\nmore on it"),
-        (1, "error: earlier\nerror: the arm broke", Failed, "the arm broke"),
-        (1, "a traceback\nMemoryError", Failed, "MemoryError"),
-        (3, "", Failed, "it printed nothing"),
-        (-9, "error: earlier", Failed, "stopped by SIGKILL; the same command continues the run"),
+        (2, "reading\nerror: no such goal\nmore on it\n", "no such goal\nmore on it"),
+        (1, "error: earlier\nerror: the arm broke", "the arm broke"),
+        (1, "a traceback\nMemoryError", "MemoryError"),
+        (3, "", "it printed nothing"),
+        (-9, "error: earlier", "stopped by SIGKILL; the same command continues the run"),
     ],
 )
-def test_a_run_that_ends_badly_is_told_by_its_last_words(tmp_path, code, said, error, words):
-    with pytest.raises(error) as caught:
-        loop.check_end(short(tmp_path), code, said.encode())
+def test_a_run_that_ends_badly_is_told_by_its_last_words(tmp_path, code, said, words):
+    with pytest.raises(Failed) as caught:
+        parallel.check_end(short(tmp_path), code, said.encode())
     assert str(caught.value) == f"{words}\nFull log: {tmp_path}/random/seed-000.log"
-    loop.check_end(short(tmp_path), 0, said.encode())
+    parallel.check_end(short(tmp_path), 0, said.encode())
 
 
 @pytest.fixture(scope="module")
@@ -234,14 +216,7 @@ def test_stopped_it_stops_its_runs_and_goes_on_as_if_nothing_had_happened(
 def test_no_library_for_figures_or_learning_is_loaded_to_watch_processes(tmp_path):
     program = (
         "import sys, sgimd_torch.runs.sweep as sweep; sweep.main(sys.argv[1:]);"
-        "print(sorted({'matplotlib', 'mujoco', 'torch', 'tensorboard', 'ray'} & {*sys.modules}))"
+        "print(sorted({'matplotlib', 'mujoco', 'torch', 'tensorboard'} & {*sys.modules}))"
     )
     code = start(program, "--dry-run", "--out", tmp_path)
     assert code.communicate()[0].splitlines()[-1] == "[]"
-
-
-def test_a_file_outside_the_working_directory_does_not_travel_to_a_cluster(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert swept("--engine", "ray", "--demonstrations", SHIPPED) == 2
-    assert re.search(f"--engine ray .*{SHIPPED.name}", capsys.readouterr().err)
-    assert not list(tmp_path.iterdir())

@@ -1,6 +1,6 @@
 """Tasks: a task is an environment with benchmark goals, demonstrations and a correspondence to translate them.
 
-The catalogue has the tasks of ``rods.py``, ``robots.py`` and ``toys.py``. A function of your own can return a task:
+The catalogue has the tasks of ``rods.py`` and ``robots.py``. A function of your own can return a task:
     def make(): return Task(Toss(), benchmark=my_goals, demonstrations=Path("shown.npz"), correspondence=translate)
 """
 

@@ -28,6 +28,7 @@ from sgimd_torch.environments.protocol import Sketch
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.figures.names import colour, label
 from sgimd_torch.runs.build import RunParts, build
+from sgimd_torch.runs.process import parser_of
 from sgimd_torch.runs.read import Run, config_of, read_run
 from sgimd_torch.spaces import Array, stream
 from sgimd_torch.strategies import Remember
@@ -163,12 +164,7 @@ def _stages(run: Run, options: argparse.Namespace) -> list[int]:
 
 def parser() -> argparse.ArgumentParser:
     """The options of ``sgimd film``."""
-    parser = argparse.ArgumentParser(
-        prog="sgimd film",
-        description=__doc__,
-        epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = parser_of("film", __doc__, epilog=EXAMPLES)
     parser.add_argument("run", type=Path, help="directory of a run: OUT/NAME/seed-003")
     goals = "points of T (default: six goals of the benchmark, or two if --after is given)"
     parser.add_argument("--goals", type=numbers, nargs="+", metavar="X,Y", help=goals)

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from sgimd_torch.files import write_text
 from sgimd_torch.record import RunError
+from sgimd_torch.runs.process import parser_of
 from sgimd_torch.views.report.page import page
 from sgimd_torch.views.variants import Variant, best_first, read
 
@@ -42,12 +43,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def parser() -> argparse.ArgumentParser:
     """The options of ``sgimd report``."""
-    parser = argparse.ArgumentParser(
-        prog="sgimd report",
-        description=__doc__,
-        epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+    parser = parser_of("report", __doc__, epilog=EXAMPLES)
     parser.add_argument("runs", type=Path, help="folder of a run, of a variant or of variants")
     parser.add_argument("--out", type=Path, metavar="FILE", help="page to write (default: RUNS/report.html)")
     parser.add_argument("--baseline", metavar="NAME", help="variant to compare the others with, seed by seed")

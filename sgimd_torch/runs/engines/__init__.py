@@ -1,1 +1,0 @@
-"""Engines carry out a list of runs, in processes of this machine or on a cluster; both kinds share ``loop``."""

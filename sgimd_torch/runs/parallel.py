@@ -1,0 +1,146 @@
+"""Carry out a list of runs, each in a process of its own: start them, show progress, name failures.
+
+failures = sweep([Config(seed=seed) for seed in range(20)], processes=4)
+"""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Final
+
+from sgimd_torch.files import make_folder
+from sgimd_torch.runs.config import Config, words
+from sgimd_torch.runs.process import Failed, Progress, Stopped, Stopping
+from sgimd_torch.runs.read import movements_on_disk
+
+POLL: Final = 0.05  # s between two looks at the processes
+REFRESH: Final = 20  # looks at the processes between two looks at the movements on disk
+PATIENCE: Final = 20.0  # s for stopped runs to save their movements; a run killed then loses a second at most
+
+Process = subprocess.Popen[bytes]
+
+
+def sweep(
+    configs: Sequence[Config],
+    processes: int,
+    *,
+    flags: Sequence[str] = (),
+    on_end: Callable[[Config], None] | None = None,
+) -> list[str]:
+    """Carry out runs in this order and show progress; a failed run does not stop the others.
+
+    Args:
+        configs: the runs, each with its own directory; they are started or resumed.
+        processes: number of runs at a time.
+        flags: flags of ``sgimd run`` for all runs, besides --resume.
+        on_end: function to call with each run that ended well; its ValueError or OSError means failure.
+
+    Returns:
+        A sentence for each failure: name of the run, last line of its log, path of the log.
+
+    Raises:
+        ValueError: two runs have the same directory.
+        OSError: a log cannot be written; all runs are stopped.
+        Stopped: a signal came; all runs are stopped.
+    """
+    twice = [path for path, n in Counter(config.directory for config in configs).items() if n > 1]
+    if twice:
+        raise ValueError(f"two runs would be written to {twice[0]}; their variants need different names")
+    done = {config: _on_disk(config) for config in configs}
+    failures: dict[Config, str] = {}
+    waiting, running = [*reversed(configs)], dict[Config, tuple[Process, int]]()
+    bar = Progress("sweep", sum(config.movements for config in configs), sum(done.values()))
+    with Stopping("stopping all runs; the same command continues them") as stopping, bar as progress:
+        try:
+            while (waiting or running) and not stopping.heard:
+                while waiting and len(running) < processes:
+                    config = waiting.pop()
+                    running[config] = _start(config, flags)
+                ended = _wait(running, stopping)
+                done |= {config: _on_disk(config) for config in running}
+                for config in ended:
+                    process, before = running.pop(config)
+                    try:
+                        check_end(config, process.returncode, log_of(config).read_bytes()[before:])
+                        if on_end is not None:
+                            on_end(config)
+                    except (Failed, ValueError, OSError) as error:
+                        failures[config] = f"{config.title} failed: {error}"
+                        progress.total -= config.movements - done[config]  # other movements are not made
+                well = len(configs) - len(waiting) - len(running) - len(failures)
+                failed = f", {len(failures)} failed" if failures else ""
+                progress.show(sum(done.values()), f"{well} of {len(configs)} runs{failed}")
+        finally:
+            _stop([process for process, _ in running.values()])
+    if stopping.heard:
+        raise Stopped(stopping.heard)
+    return [failures[config] for config in configs if config in failures]
+
+
+def _start(config: Config, flags: Sequence[str]) -> tuple[Process, int]:
+    """The process of a run, and the length of its log before."""
+    make_folder(config.directory.parent)
+    command = [sys.executable, "-m", "sgimd_torch", "run", "--resume", *flags, *words(config)]
+    with log_of(config).open("ab") as log:
+        before = log.tell()
+        # The run has its own process group: Ctrl-C reaches only this process, which passes it on.
+        return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log, process_group=0), before
+
+
+def _wait(running: Mapping[Config, tuple[Process, int]], stopping: Stopping) -> list[Config]:
+    """The runs that have ended, as soon as there is one; after ``REFRESH`` looks or a signal, perhaps none."""
+    ended: list[Config] = []
+    for _ in range(REFRESH):
+        time.sleep(POLL)
+        ended = [config for config, (process, _) in running.items() if process.poll() is not None]
+        if ended or stopping.heard:
+            break
+    return ended
+
+
+def _stop(processes: Sequence[Process]) -> None:
+    """Stop runs; they get some time to save their movements."""
+    for process in processes:
+        process.terminate()
+    deadline = time.monotonic() + PATIENCE
+    for process in processes:
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(max(0.0, deadline - time.monotonic()))
+        process.kill()
+
+
+def log_of(config: Config) -> Path:
+    """The log of a run's output, next to its directory."""
+    return config.directory.with_suffix(".log")
+
+
+def check_end(config: Config, code: int, said: bytes) -> None:
+    """Raise an error with the last line of the output if a run did not end well.
+
+    Args:
+        config: configuration of the run.
+        code: exit code of its process; if negative, the signal that killed it.
+        said: output of its process.
+
+    Raises:
+        Failed: the run failed.
+    """
+    if code == 0:
+        return
+    _, mark, last = ("\n" + said.decode(errors="replace").rstrip()).rpartition("\nerror: ")
+    if code < 0:
+        last = f"stopped by {signal.Signals(-code).name}; the same command continues the run"
+    elif not mark:
+        last = last.rpartition("\n")[2] or "it printed nothing"
+    raise Failed(f"{last}\nFull log: {log_of(config)}")
+
+
+def _on_disk(config: Config) -> int:
+    return min(movements_on_disk(config.directory), config.movements)
