@@ -128,18 +128,21 @@ def run(
             told: list[Array | Failure | None] = []
             for place in range(min(at_once, movements - first)):
                 caused = _offered(learner, teacher, first + place, place, before.get(place, BeforeMovement()))
-                context = _observed(learner, environment, first + place, place, seed)
-                seen = not isinstance(context, Failure)
-                if teachers and caused.request is None and seen:
-                    caused = _asked(learner, environment, context, place, teachers, caused)
+                seen = _observed(learner, environment, first + place, place, seed)
+                if isinstance(seen, Failure):
+                    contexts.append(None)
+                    told.append(seen)
+                else:
+                    if teachers and caused.request is None:
+                        caused = _asked(learner, environment, seen, place, teachers, caused)
+                    contexts.append(seen)
+                    told.append(None)
                 before[place] = caused
-                contexts.append(context if seen else None)
-                told.append(None if seen else context)
             moves = learner.ask_many(contexts)
-            moving = [(first + k, contexts[k], move.theta) for k, move in enumerate(moves) if move is not None]
-            if moving:
-                for (index, *_), outcome in zip(moving, execute(*zip(*moving, strict=True)), strict=True):
-                    told[index - first] = outcome
+            chosen = [(first + k, contexts[k], move.theta) for k, move in enumerate(moves) if move is not None]
+            if chosen:
+                for (index, *_), reached in zip(chosen, execute(*zip(*chosen, strict=True)), strict=True):
+                    told[index - first] = reached
             learner.tell_many(told)
             too_many: Failure | None = None
             for place, (context, move, outcome) in enumerate(zip(contexts, moves, told, strict=True)):

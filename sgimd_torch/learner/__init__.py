@@ -118,8 +118,7 @@ class Learner:
                 context, theta, outcome = memory.contexts[row], memory.thetas[row], memory.outcomes[row]
                 each = Event(Kind.MOVED, context, theta, outcome=outcome, place=place)
             yield each
-        asked = [place for place, _ in self._asked]
-        yield from (each.begun() for each in self._new if each not in asked)
+        yield from self._begun([place for place, move in self._asked if not isinstance(move, Failure)])
 
     def ask(self, context: ArrayLike) -> Move | None:
         """The next movement, or None, which is a rest: there is no outcome to tell.
@@ -141,8 +140,8 @@ class Learner:
         """The next movements of several robots, before the outcome of any of them is known.
 
         Args:
-            contexts: for each robot its context ``(context_dim,)``. An attempt keeps its context, see `context_at`.
-                None: the robot has failed before it could see a context.
+            contexts: context ``(context_dim,)`` of each robot; an attempt keeps its context, see `context_at`. None:
+                the robot failed before it saw a context.
 
         Returns:
             For each robot its movement. None: it rests, or has no context.
@@ -219,8 +218,8 @@ class Learner:
         """Tell what came of the movements from `ask_many`, in the same order; outcomes enter the memory in this order.
 
         Args:
-            outcomes: for each movement its outcome ``(outcome_dim,)``, or a `Failure`; None for a rest or without a
-                context.
+            outcomes: outcome ``(outcome_dim,)`` of each movement, or its `Failure`; None for a rest, or for a robot
+                without a context.
 
         Raises:
             RuntimeError: `ask_many` has given no movements.
@@ -318,7 +317,7 @@ class Learner:
     def interrupt(self) -> None:
         """End all attempts under way; their movements so far count. Outcomes that were not told are no longer
         expected."""
-        asked, self._asked = [each for each in self._asked if each[0].attempt is not None], []
+        asked, self._asked = [each for each in self._asked if not isinstance(each[1], Failure)], []
         if self.idle:
             return
         self._report_new(*(place for place, _ in asked))
@@ -359,9 +358,11 @@ class Learner:
         """What came of a movement; a rest without anything is None."""
         if isinstance(outcome, Failure):
             return outcome
-        if isinstance(move, Move) == (outcome is None):
+        if isinstance(move, Move) and outcome is not None:
+            return self.memory.check_outcome(move.theta, outcome)
+        if isinstance(move, Move) or outcome is not None:
             raise ValueError(f"a movement has an outcome or a Failure, a rest has None; got {outcome} for {move}")
-        return self.memory.check_outcome(move.theta, outcome) if isinstance(move, Move) else move
+        return move
 
     def _tell(self, place: Place, move: Move | None, outcome: Array | Failure | None) -> None:
         """Tell what came of the movement at one place, after its check."""
@@ -389,13 +390,17 @@ class Learner:
                 listener(event)
 
     def _report_new(self, *reported: Place) -> None:
-        """Publish the beginnings of new attempts, unless the next events, at the places ``reported``, tell their order.
+        """Publish the beginnings of new attempts, unless the next events, at the places ``reported``, tell them."""
+        begun, self._new = self._begun(reported), []
+        self._publish(*begun)
+
+    def _begun(self, reported: Sequence[Place]) -> list[Event]:
+        """Events of all new attempts; none if events at the places ``reported`` tell all of them in their order.
 
         A replay begins attempts in the order of the events, so that each draws the same random numbers again.
         """
-        new, self._new = self._new, []
-        if new != [each for each in reported if each in new]:
-            self._publish(*(each.begun() for each in new))
+        in_order = self._new == [each for each in reported if each in self._new]
+        return [] if in_order else [each.begun() for each in self._new]
 
 
 def _lesson(demonstration: Demonstration, theta_d: Array) -> tuple[bytes, bytes]:

@@ -112,7 +112,8 @@ def _together(events: Iterable[Event]) -> Iterator[list[Event]]:
     group: list[Event] = []
     for event in events:
         moved = event.kind not in (Kind.SHOWN, Kind.ASKED) and event.place >= 0
-        if group and not (moved and event.place > group[-1].place):
+        same = group and (event.kind == Kind.INTERRUPTED) == (group[-1].kind == Kind.INTERRUPTED)
+        if group and not (moved and same and event.place > group[-1].place):
             yield group
             group = []
         if moved:

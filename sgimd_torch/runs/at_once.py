@@ -14,6 +14,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager, contextmanager, nullcontext
+from multiprocessing.process import BaseProcess
 
 from sgimd_torch.environments.protocol import BatchEnvironment, Environment, Limited
 from sgimd_torch.session import Execute, live, reason_of
@@ -73,10 +74,15 @@ def _begin(pickled: bytes, seed: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
     assert parent is not None
-    threading.Thread(target=lambda: (parent.join(), os._exit(1)), daemon=True).start()
+    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
     _here = live(pickle.loads(pickled), seed)
 
 
 def _execute(index: int, context: Array, theta: Array) -> Array | Failure:
     (outcome,) = _here([index], [context], [theta])
     return Failure(outcome.reason) if isinstance(outcome, Failure) else outcome  # its cause may not be picklable
+
+
+def _end_with(parent: BaseProcess) -> None:
+    parent.join()
+    os._exit(1)

@@ -43,8 +43,7 @@ LEARNERS = {
 
 def act(learner, what, k, place=0):
     """What a caller may do with a learner, if it is possible now; ``k`` chooses the context and the lesson."""
-    here = learner.context_at(place)
-    context = CONTEXTS[k % 2] if here is None else here
+    first, context = (CONTEXTS[k % 2] if (here := learner.context_at(each)) is None else here for each in (0, place))
     waits_for_outcome = learner._asked
     match what:
         case "ask many" | "ask some" if not waits_for_outcome:
@@ -57,11 +56,11 @@ def act(learner, what, k, place=0):
             outcomes = [np.array([0.1 * k, 0.2]) if isinstance(each, Move) else None for _, each in waits_for_outcome]
             learner.tell_many([Failure("lost") if n == k else each for n, each in enumerate(outcomes)])
         case "move" if not waits_for_outcome:
-            move = learner.ask(context)
+            move = learner.ask(first)
             if move is not None:
-                learner.tell(ARM.execute(context, move.theta, stream(k, "noise")))
+                learner.tell(ARM.execute(first, move.theta, stream(k, "noise")))
         case "ask" if not waits_for_outcome:
-            learner.ask(context)
+            learner.ask(first)
         case "request" if not waits_for_outcome:
             learner.request(context, place=place)
         case "alone" if learner._places[place].request:
