@@ -4,31 +4,52 @@ Algorithm 1 of Nguyen & Oudeyer (2014).
     for episode in run(learner, environment, seed, movements=5000, teacher=teacher): ...
 Movement i draws its noise from stream i. So its noise does not depend on earlier movements, whether they were executed
 or only replayed.
+
+With ``at_once=8`` eight robots move at once: the learner proposes eight movements before it knows the outcome of any.
+Each robot has attempts of its own. A demonstration before movement i goes to the robot of movement i; its attempt ends,
+and the others go on. A robot that imitates, or rests until a teacher replies, does so for movement after movement.
+All robots wait for the slowest. A robot that fails ends its own attempt only.
 """
 
 from __future__ import annotations
 
 import traceback
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.environments.protocol import FAILURES, Environment, SimulationError, check_instance
+from sgimd_torch.environments.protocol import (
+    FAILURES,
+    BatchEnvironment,
+    Environment,
+    SimulationError,
+    check_instance,
+)
 from sgimd_torch.learner import Learner
 from sgimd_torch.learner.events import BeforeMovement
 from sgimd_torch.parts import Teacher
-from sgimd_torch.spaces import Array, Demonstration, Episode, Request, check_count, check_point, read_only, stream
+from sgimd_torch.spaces import (
+    Array,
+    Demonstration,
+    Episode,
+    Failure,
+    Request,
+    check_count,
+    check_point,
+    read_only,
+    stream,
+)
 
 if TYPE_CHECKING:
     from sgimd_torch.learner.requests import Demonstrator
     from sgimd_torch.record import Record
 
-Execute = Callable[[int, Array, Array], Array]
-"""Function (index, context, theta) -> outcome of movement ``index``."""
+Execute = Callable[[Sequence[int], Sequence[Array], Sequence[Array]], Sequence[Array | Failure]]
+"""Function (indices, contexts, thetas) -> for each of these movements its outcome, or a failure."""
 
 
 class NoOutcomeError(RuntimeError):
@@ -46,6 +67,7 @@ def run(
     execute: Execute | None = None,
     record: Record | None = None,
     failures: int = FAILURES,
+    at_once: int = 1,
 ) -> Iterator[Episode]:
     """Let ``learner`` move until it has made this number of ``movements``; rests and failed movements count.
 
@@ -68,6 +90,8 @@ def run(
         record: record to write. Its events are replayed first; the replay executes nothing and asks no teacher of
             ``teachers``. Learner and teacher must be freshly built.
         failures: number of failed movements in a row that ends the run, at least 1.
+        at_once: number of robots that move at once, at least 1. `BatchEnvironment.execute_many` executes their
+            movements; other environments execute them one after the other.
 
     Yields:
         Every episode, after the learner was told the outcome.
@@ -78,6 +102,7 @@ def run(
         NoOutcomeError: ``failures`` movements in a row have failed. They count; another `run` may go on.
     """
     check_count("failures", failures, 1)
+    check_count("at_once", at_once, 1)
     if not isinstance(learner, Learner):
         raise ValueError(f"learner must be a Learner, got a {type(learner).__name__}; try sagg_riac(environment, seed)")
     check_instance(environment)
@@ -89,7 +114,7 @@ def run(
             f"movements must be above {made}, the number that the learner has made already, got {movements}"
         )
     execute = live(environment, seed) if execute is None else execute
-    before = BeforeMovement()
+    before: dict[int, BeforeMovement] = {}
     with ExitStack() as until_the_end:
         if record is not None:
             from sgimd_torch.record.replay import replay  # loaded here, as most programs keep no record
@@ -98,46 +123,61 @@ def run(
             learner.listeners.append(record.add)
             until_the_end.callback(learner.listeners.remove, record.add)
         in_a_row = 0
-        for index in range(learner.movements, movements):
-            before = _offered(learner, teacher, index, before)
-            context, move, outcome = None, None, None
-            try:
-                context = _observed(learner, environment, index, seed)
-                if teachers and before.request is None:
-                    before = _asked(learner, environment, context, teachers, before)
-                move = learner.ask(context)
-                if move is not None:
-                    outcome = _tried("outcome", environment.outcomes.dim, execute, index, context, move.theta)
-            except _NoOutcome as error:
-                failed, in_a_row, cause = str(error), in_a_row + 1, error.__cause__
-                learner.fail(failed)
-                seen = np.full(environment.contexts.dim, np.nan) if context is None else context
-                yield Episode(index, seen, move, None, *before, failed)
-                if in_a_row == failures:
-                    raise NoOutcomeError(f"{failures} movements in a row failed, the last one: {failed}") from cause
-            else:
-                if outcome is not None:
-                    in_a_row = 0
-                    learner.tell(outcome)
-                yield Episode(index, context, move, outcome, *before)
-            before = BeforeMovement()
+        while (first := learner.movements) < movements:
+            contexts: list[Array | None] = []
+            told: list[Array | Failure | None] = []
+            for place in range(min(at_once, movements - first)):
+                caused = _offered(learner, teacher, first + place, place, before.get(place, BeforeMovement()))
+                seen = _observed(learner, environment, first + place, place, seed)
+                if isinstance(seen, Failure):
+                    contexts.append(None)
+                    told.append(seen)
+                else:
+                    if teachers and caused.request is None:
+                        caused = _asked(learner, environment, seen, place, teachers, caused)
+                    contexts.append(seen)
+                    told.append(None)
+                before[place] = caused
+            moves = learner.ask_many(contexts)
+            chosen = [(first + k, contexts[k], move.theta) for k, move in enumerate(moves) if move is not None]
+            if chosen:
+                for (index, *_), reached in zip(chosen, execute(*zip(*chosen, strict=True)), strict=True):
+                    told[index - first] = reached
+            learner.tell_many(told)
+            too_many: Failure | None = None
+            for place, (context, move, outcome) in enumerate(zip(contexts, moves, told, strict=True)):
+                context = np.full(environment.contexts.dim, np.nan) if context is None else context
+                caused = before.pop(place)
+                if not isinstance(outcome, Failure):
+                    in_a_row = 0 if move is not None else in_a_row
+                    yield Episode(first + place, context, move, outcome, *caused)
+                    continue
+                in_a_row += 1
+                too_many = outcome if in_a_row == failures else too_many
+                yield Episode(first + place, context, move, None, *caused, outcome.reason)
+            if too_many is not None:
+                reason = f"{failures} movements in a row failed, the last one: {too_many.reason}"
+                raise NoOutcomeError(reason) from too_many.cause
 
 
-def _offered(learner: Learner, teacher: Teacher | None, index: int, before: BeforeMovement) -> BeforeMovement:
-    """Let the teacher offer a demonstration, unless the learner has not yet used the last one."""
-    if teacher is None or learner.lesson_waits:
+def _offered(
+    learner: Learner, teacher: Teacher | None, index: int, place: int, before: BeforeMovement
+) -> BeforeMovement:
+    """Let the teacher offer a demonstration, unless the robot has not yet used the last one."""
+    if teacher is None or learner.lesson_waits_at(place):
         return before
     offered = teacher.offer(index, learner.memory)
     if offered is None:
         return before
-    learner.watch(offered, who=teacher.who)
+    learner.watch(offered, who=teacher.who, place=place)
     return before._replace(demonstration=offered)
 
 
-def _observed(learner: Learner, environment: Environment, index: int, seed: int) -> Array:
+def _observed(learner: Learner, environment: Environment, index: int, place: int, seed: int) -> Array | Failure:
     """The context of the next movement: the context of the current attempt, or a new one if an attempt is to begin."""
-    if not learner.idle:
-        return learner.context
+    context = learner.context_at(place)
+    if context is not None:
+        return context
     return _tried("context", environment.contexts.dim, environment.observe, stream(seed, "context", index))
 
 
@@ -145,31 +185,28 @@ def _asked(
     learner: Learner,
     environment: Environment,
     context: Array,
+    place: int,
     teachers: Mapping[str, Demonstrator],
     before: BeforeMovement,
 ) -> BeforeMovement:
     """Let the learner ask one of the ``teachers`` for a demonstration, and show the learner the reply."""
-    request = learner.request(context)
+    request = learner.request(context, place=place)
     if request is None:
         return before
     answer, reply = _answer(learner, environment, context, request, teachers)
     if answer is None:
-        learner.go_on_alone(reply)
+        learner.go_on_alone(reply, place=place)
         return before._replace(request=request, reply=reply)
-    learner.watch(answer)
+    learner.watch(answer, place=place)
     return BeforeMovement(answer, request, reply)
 
 
-class _NoOutcome(Exception):
-    """A movement failed; the message is the reason."""
-
-
-def _tried(name: str, dim: int, robot: Callable[..., ArrayLike], *given: Any) -> Array:
-    """Result of a call of the robot, as ``(dim,)`` finite numbers."""
+def _tried(name: str, dim: int, robot: Callable[..., ArrayLike], *given: Any) -> Array | Failure:
+    """Result of a call of the robot, as ``(dim,)`` finite numbers, or why there is none."""
     try:
         return read_only(check_point(name, robot(*given), dim))
     except (Exception, SystemExit) as error:  # no failure of a robot may end the run
-        raise _NoOutcome(reason_of(error)) from error
+        return Failure(reason_of(error), error)
 
 
 def reason_of(error: BaseException) -> str:
@@ -208,8 +245,26 @@ def _answer(
 def live(environment: Environment, seed: int) -> Execute:
     """The function that executes movements in ``environment``; movement i draws its noise from stream i."""
 
-    def execute(index: int, context: Array, theta: Array) -> Array:
+    def execute(indices: Sequence[int], contexts: Sequence[Array], thetas: Sequence[Array]) -> list[Array | Failure]:
+        rngs, dim = [stream(seed, "environment", index) for index in indices], environment.outcomes.dim
+        if len(indices) > 1 and isinstance(environment, BatchEnvironment):
+            return _tried_together(environment, np.stack(contexts), np.stack(thetas), rngs)
         # The environment gets copies, so it may write into them.
-        return environment.execute(context.copy(), theta.copy(), stream(seed, "environment", index))
+        moves = zip(contexts, thetas, rngs, strict=True)
+        return [_tried("outcome", dim, environment.execute, c.copy(), theta.copy(), rng) for c, theta, rng in moves]
 
     return execute
+
+
+def _tried_together(
+    environment: BatchEnvironment, contexts: Array, thetas: Array, rngs: Sequence[np.random.Generator]
+) -> list[Array | Failure]:
+    """Outcomes of `BatchEnvironment.execute_many`; if it raises, all movements have failed."""
+    n, dim = len(thetas), environment.outcomes.dim
+    try:
+        outcomes = np.asarray(environment.execute_many(contexts, thetas, rngs))
+        if outcomes.shape != (n, dim):
+            raise ValueError(f"execute_many() must give {n} outcomes in rows, ({n}, {dim}), got {outcomes.shape}")
+    except (Exception, SystemExit) as error:  # no failure of a robot may end the run
+        return [Failure(reason_of(error), error)] * n
+    return [_tried("outcome", dim, lambda each=each: each) for each in outcomes]

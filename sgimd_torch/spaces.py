@@ -235,6 +235,13 @@ class Move:
         _own(self, "theta", "goal")
 
 
+class Failure(NamedTuple):
+    """A movement without an outcome, the ``reason`` why it has none, and the exception behind the reason."""
+
+    reason: str
+    cause: BaseException | None = None
+
+
 class Estimate(NamedTuple):
     """The answer of an inverse model to a goal in a ``context`` ``(context_dim,)``: ``theta`` ``(theta_dim,)``, and
     exemplars at which a search may begin, ``thetas`` ``(k, theta_dim)`` with ``outcomes`` ``(k, outcome_dim)``."""

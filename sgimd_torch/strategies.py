@@ -268,6 +268,24 @@ class Remember(Social):
         yield from ()  # makes this a generator
 
 
+def watched(attempt: Attempt, executed: list[tuple[Array, Array]]) -> Attempt:
+    """The movements of ``attempt``; each theta is appended to ``executed`` with its outcome.
+
+    The memory may have outcomes of other robots in between.
+    """
+    outcome: Array | None = None
+    try:
+        while True:
+            move = attempt.send(outcome)  # type: ignore[arg-type]
+            outcome = yield move
+            if move is not None:
+                executed.append((move.theta, outcome))
+    except StopIteration:
+        return
+    finally:
+        attempt.close()
+
+
 def _babbling(problem: Problem) -> GoalBabbling:
     """The goal babbling of the learner, whose goal model is told about demonstrated goals."""
     if not isinstance(problem.autonomous, GoalBabbling):

@@ -18,7 +18,7 @@ from sgimd_torch.asking.interest import AUTONOMOUS, StrategicGoals
 from sgimd_torch.goals.regions import Region
 from sgimd_torch.parts import Problem, Social, Strategy
 from sgimd_torch.spaces import Array, AskingAttempt, Request
-from sgimd_torch.strategies import GoalBabbling
+from sgimd_torch.strategies import GoalBabbling, watched
 
 
 class Asking(NamedTuple):
@@ -79,13 +79,13 @@ class StrategicBabbling(Strategy):
             return
         for _ in range(takes):
             yield None
-        memory, shown = self.babbling.memory, lesson.demonstration.outcome
-        first = len(memory)
+        shown = lesson.demonstration.outcome
+        executed: list[tuple[Array, Array]] = []
         there = self.babbling.competence(context, shown)
         try:
-            yield from answer.attempt(context, *lesson)
+            yield from watched(answer.attempt(context, *lesson), executed)
         finally:  # interruption by another demonstration included
-            outcomes = list(memory.outcomes[first:])
+            outcomes = [outcome for _, outcome in executed]
             self.babbling.conclude(context, goal, outcomes, before, strategy)
             if self.problem.outcomes.contains(shown):
                 self.babbling.conclude(context, shown, outcomes, there, strategy)

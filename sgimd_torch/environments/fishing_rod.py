@@ -103,15 +103,19 @@ class FishingRod:
             SimulationError: the simulation diverged; the message names theta.
         """
         context, theta = check_movement(self, context, theta)
-        return self._execute(context[None], theta[None], [rng])[0]
+        (landing,) = self._execute(context[None], theta[None], [rng])
+        if np.isnan(landing).any():
+            raise SimulationError(f"the simulation diverged in context {context.tolist()}", theta)
+        return landing
 
     def execute_many(self, contexts: Array, thetas: Array, rngs: Sequence[np.random.Generator]) -> Array:
-        """``(n, 2)`` m, landing points; row i equals ``execute(contexts[i], thetas[i], rngs[i])`` bit for bit.
+        """``(n, 2)`` m, landing points; NaN if a simulation diverged.
 
-        The arguments are not checked; the function `execute_many` of ``protocol.py`` does that.
+        Row i equals ``execute(contexts[i], thetas[i], rngs[i])`` bit for bit. The arguments are not checked; the
+        function `execute_many` of ``protocol.py`` does that.
 
         Raises:
-            TypeError, SimulationError: see ``execute``.
+            TypeError: see ``execute``.
         """
         # Each block has as many steps as its longest movement, so movements of similar duration share a block.
         order = thetas[:, -1].argsort(kind="stable")
@@ -125,7 +129,7 @@ class FishingRod:
         """Run one movement and keep the state at every step, for films; this takes twice as long as ``execute``."""
         context, theta = check_movement(self, context, theta)
         commands, end = self._commands(theta, rng), self.primitive.duration(theta) + HOLD
-        outcome = self._cast(context[None], theta[None], [commands], np.array([end]))[0]
+        (outcome,), _ = self._caster.cast([commands], np.array([end]), np.array([context.sum()]))
         return self._caster.trace(outcome, commands, end, float(context.sum()))
 
     def replay(self, times: ArrayLike, trajectory: ArrayLike) -> Array:
@@ -156,14 +160,7 @@ class FishingRod:
     def _execute(self, contexts: Array, thetas: Array, rngs: Sequence[np.random.Generator]) -> Array:
         commands = [self._commands(theta, rng) for theta, rng in zip(thetas, rngs, strict=True)]
         ends = np.array([self.primitive.duration(theta) + HOLD for theta in thetas])
-        return self._cast(contexts, thetas, commands, ends)
-
-    def _cast(self, contexts: Array, thetas: Array, commands: list[Array], ends: Array) -> Array:
-        winds = contexts.sum(axis=1)  # an empty context sums to 0
-        landings, diverged = self._caster.cast(commands, ends, winds)
-        if diverged.any():
-            row = int(np.flatnonzero(diverged)[0])
-            raise SimulationError(f"the simulation diverged in context {contexts[row].tolist()}", thetas[row])
+        landings, _ = self._caster.cast(commands, ends, contexts.sum(axis=1))  # an empty context sums to 0
         return landings
 
     def _times(self, end: float) -> Array:

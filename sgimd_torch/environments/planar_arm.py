@@ -5,6 +5,8 @@ arm = PlanarArm(); outcome = arm.execute(arm.observe(rng), theta, rng)
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -65,6 +67,10 @@ class PlanarArm:
         """
         context, theta = check_movement(self, context, theta)
         return self._end(context, self._moved(theta, rng))
+
+    def execute_many(self, contexts: Array, thetas: Array, rngs: Sequence[np.random.Generator]) -> Array:
+        """``(n, 2)`` m, outcomes of movements side by side; row i equals ``execute`` for row i bit for bit."""
+        return self._end(contexts, np.stack([self._moved(*each) for each in zip(thetas, rngs, strict=True)]))
 
     def trace(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Sketch:
         """Drawings of a movement: in 1 s all joints turn smoothly from the straight arm to their angles."""
@@ -140,8 +146,9 @@ class PlanarArm:
         return self.angles(theta) + self.noise * rng.standard_normal(len(theta))
 
     def _end(self, context: Array, angles: Array) -> Array:
-        directions = np.cumsum(angles) + context.sum()  # an empty context sums to 0
-        return 1 / len(angles) * np.array([np.cos(directions).sum(), np.sin(directions).sum()])
+        """``(..., 2)`` m, the end of the arm with these ``angles`` ``(..., n_joints)``."""
+        directions = np.cumsum(angles, axis=-1) + context.sum(axis=-1, keepdims=True)  # an empty context sums to 0
+        return 1 / self.policies.dim * np.stack([np.cos(directions).sum(-1), np.sin(directions).sum(-1)], axis=-1)
 
     def _radius(self, bend: float) -> float:
         """Distance (m) of the end from the base if all joints but the first are at ``bend`` (rad)."""

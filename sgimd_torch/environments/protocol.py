@@ -66,7 +66,20 @@ class BatchEnvironment(Environment, Protocol):
     """An environment that executes many movements faster together than one by one."""
 
     def execute_many(self, contexts: Array, thetas: Array, rngs: Sequence[np.random.Generator]) -> Array:
-        """``(n, outcome_dim)``, row i equal to ``execute(contexts[i], thetas[i], rngs[i])`` bit for bit."""
+        """``(n, outcome_dim)``, row i equal to ``execute(contexts[i], thetas[i], rngs[i])`` bit for bit.
+
+        A movement without an outcome has a row of NaN. An exception means that no movement has an outcome.
+        """
+        ...
+
+
+@runtime_checkable
+class Limited(Protocol):
+    """An environment that cannot make any number of movements at once, such as the driver of a single robot."""
+
+    @property
+    def at_once(self) -> int:
+        """Largest number of movements at once."""
         ...
 
 

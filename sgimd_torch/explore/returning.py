@@ -36,7 +36,8 @@ class Returning(Explore):
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)
         self.width, self._widening = problem.shared(Width, Width), Widening(problem)
-        self._varied: Array | None = None  # the last variation
+        self._varied: list[Array] = []  # variations whose effect is not known yet
+        self._seen = 0  # number of exemplars at the last look
         inverse = type(problem.inverse)
         if inverse.effects is Inverse.effects:
             problem.remarks.append(f"exploration does not look for effects: {inverse.__name__} does not report them")
@@ -53,12 +54,14 @@ class Returning(Explore):
         acted, policies = self.problem.inverse.effects(), self.problem.policies
         if acted is None:
             return self._widening(context)
-        if self._varied is not None:
-            self.width.update(bool((acted.thetas == self._varied).all(axis=1).any()))
-            self._varied = None
+        if len(self.problem.memory) > self._seen:  # several robots may move at once
+            for theta in self._varied:
+                self.width.update(bool((acted.thetas == theta).all(axis=1).any()))
+            self._varied, self._seen = [], len(self.problem.memory)
         if not len(acted) or self.rng.random() < _ANYWHERE:
             return policies.sample(self.rng)
         alike = np.linalg.norm(acted.contexts - context, axis=1).argsort(kind="stable")
         theta = acted.thetas[self.rng.choice(alike[:_NEAREST] if acted.context_dim else alike)]
-        self._varied = policies.clip(self.rng.normal(theta, self.width.sd * policies.sides))
-        return self._varied
+        varied = policies.clip(self.rng.normal(theta, self.width.sd * policies.sides))
+        self._varied.append(varied)
+        return varied

@@ -43,7 +43,8 @@ class Widening(Explore):
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)
         self.width = problem.shared(Width, Width)
-        self._expected: tuple[int, Array] | None = None  # row and expected outcome of the last global movement
+        self._expected: list[tuple[Array, Array]] = []  # global movements without a known outcome, and predictions
+        self._compared = 0  # number of exemplars that `_compare` has seen
         inverse = type(problem.inverse)
         if inverse.predict is Inverse.predict:
             problem.remarks.append(f"exploration does not widen: {inverse.__name__} predicts nothing")
@@ -55,14 +56,20 @@ class Widening(Explore):
         middle = (policies.low + policies.high) / 2
         theta = policies.clip(self.rng.normal(middle, self.width.sd * policies.sides))
         expected = self.problem.inverse.predict(context, theta)
-        self._expected = None if expected is None else (len(self.problem.memory), expected)
+        if expected is not None:
+            self._expected.append((theta, expected))
         return theta
 
     def _compare(self) -> None:
-        """Update the width by the outcome of the last global movement, once it is known."""
-        outcomes = self.problem.memory.outcomes
-        if self._expected is None or self._expected[0] >= len(outcomes):
+        """Update the width by the outcomes of global movements that are known since the last call."""
+        memory, expected = self.problem.memory, self._expected
+        new, self._compared = range(self._compared, len(memory)), len(memory)
+        if not new or not expected:
             return
-        row, expected = self._expected
-        variance = outcomes[:: 1 + len(outcomes) // _LOOKED_AT].var(axis=0).sum()
-        self.width.update(bool(((outcomes[row] - expected) ** 2).sum() <= _WELL * variance))
+        self._expected = []
+        variance = memory.outcomes[:: 1 + len(memory) // _LOOKED_AT].var(axis=0).sum()
+        for theta, outcome in expected:
+            for row in new:
+                if np.array_equal(memory.thetas[row], theta):
+                    error = ((memory.outcomes[row] - outcome) ** 2).sum()
+                    self.width.update(bool(error <= _WELL * variance))

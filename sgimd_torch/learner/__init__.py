@@ -5,6 +5,9 @@ autonomous and a social one. The caller owns the loop: ``move = learner.ask(cont
 ``learner.tell(outcome)``. ``learner.watch(demonstration)`` shows a demonstration. ``learner.request(context)``, before
 ``ask``, returns the request of a learner that asks teachers. ``learner.inverse(context, goal).theta`` is the movement
 for a goal. ``learner.listeners.append(print)`` prints every event.
+
+Several robots move at once by ``moves = learner.ask_many(contexts)`` and ``learner.tell_many(outcomes)``. Robot k has
+place k of the learner, where its attempts go on. All robots share one memory, one goal model and one record.
 """
 
 from __future__ import annotations
@@ -16,8 +19,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sgimd_torch.learner.events import Event, Kind
+from sgimd_torch.learner.places import Place
 from sgimd_torch.parts import Inverse, Problem, Social, Strategy
-from sgimd_torch.spaces import Array, AskingAttempt, Demonstration, Lesson, Move, Request, check_point, read_only
+from sgimd_torch.spaces import Array, Demonstration, Failure, Lesson, Move, Request, check_point, read_only
 
 Correspondence = Callable[[Array, Array], Array]
 """Function from times ``(n_times,)`` and trajectory ``(n_times, n_joints)`` to theta_d ``(theta_dim,)``, eq. (6)."""
@@ -58,24 +62,25 @@ class Learner:
         self.inverse: Inverse = problem.inverse
         self.listeners: list[Callable[[Event], object]] = []
         self.begun, self.movements = len(self.memory), 0
-        self._life: list[int | Event] = []  # events; for a movement, its row in memory
-        self._attempt: AskingAttempt | None = None
-        self._context: Array = np.zeros(0)
-        self._next: Move | Request | None = None  # last yield of the attempt, without outcome or reply so far
-        self._asked = False
-        self._untold = False  # whether `request` began an attempt that no event has reported yet
+        self._life: list[tuple[int, int] | Event] = []  # events; for a movement, its row in memory and its place
+        self._places = [Place(0)]
+        self._new: list[Place] = []  # places whose attempt no event has reported so far, in order of beginning
+        self._asked: list[tuple[Place, Move | Failure | None]] = []  # what was asked for last and is not told so far
         self._lessons: set[tuple[bytes, bytes]] = set()
-        self._offered_at = -1  # number of movements when a teacher offered the current lesson
 
     @property
     def idle(self) -> bool:
         """Whether no attempt is under way; then the next ``ask`` begins one, in any context."""
-        return self._attempt is None
+        return all(each.attempt is None for each in self._places)
 
     @property
     def lesson_waits(self) -> bool:
         """Whether an offered demonstration is still unanswered; a continued `run` then asks for no other one."""
-        return self._offered_at == self.movements
+        return self.lesson_waits_at(0)
+
+    def lesson_waits_at(self, place: int) -> bool:
+        """Whether the demonstration that was offered to the robot at ``place`` is still unanswered."""
+        return self._place(place).offered_at == self.movements
 
     @property
     def regions(self) -> Sequence[Any]:
@@ -85,7 +90,7 @@ class Learner:
     @property
     def waits_for_answer(self) -> bool:
         """Whether the learner has asked for a demonstration and has no reply yet."""
-        return isinstance(self._next, Request)
+        return any(each.request is not None for each in self._places)
 
     @property
     def context(self) -> Array:
@@ -94,19 +99,26 @@ class Learner:
         Raises:
             RuntimeError: no attempt is under way.
         """
-        if self._attempt is None:
+        context = self.context_at(0)
+        if context is None:
             raise RuntimeError("no attempt is under way, so the context may be any; see idle")
-        return self._context
+        return context
+
+    def context_at(self, place: int) -> Array | None:
+        """Context of the attempt under way at ``place``, read-only; None: the next attempt there may have any."""
+        here = self._place(place)
+        return None if here.attempt is None else here.context
 
     def events(self) -> Iterator[Event]:
         """All events so far, in order; movements lack goal and origin."""
         memory = self.memory
         for each in self._life:
-            if isinstance(each, int):
-                each = Event(Kind.MOVED, memory.contexts[each], memory.thetas[each], outcome=memory.outcomes[each])
+            if not isinstance(each, Event):
+                row, place = each
+                context, theta, outcome = memory.contexts[row], memory.thetas[row], memory.outcomes[row]
+                each = Event(Kind.MOVED, context, theta, outcome=outcome, place=place)
             yield each
-        if self._untold:
-            yield self._begun_event
+        yield from self._begun([place for place, move in self._asked if not isinstance(move, Failure)])
 
     def ask(self, context: ArrayLike) -> Move | None:
         """The next movement, or None, which is a rest: there is no outcome to tell.
@@ -119,56 +131,74 @@ class Learner:
             RuntimeError: the outcome of the last movement was not told, or the context changed during an attempt.
             ValueError: the context has another shape, or is not finite.
         """
-        context = check_point("context", context, self.memory.context_dim)
+        (move,) = self.ask_many([context])
+        if move is None:
+            self.tell_many([None])
+        return move
+
+    def ask_many(self, contexts: Sequence[ArrayLike | None]) -> list[Move | None]:
+        """The next movements of several robots, before the outcome of any of them is known.
+
+        Args:
+            contexts: context ``(context_dim,)`` of each robot; an attempt keeps its context, see `context_at`. None:
+                the robot failed before it saw a context.
+
+        Returns:
+            For each robot its movement. None: it rests, or has no context.
+
+        Raises:
+            RuntimeError: outcomes of the last movements were not told, or a context changed during an attempt.
+            ValueError: there are no contexts, or one has another shape or is not finite.
+        """
         if self._asked:
             raise RuntimeError(
                 "ask() again needs the outcome of the last movement; was tell() forgotten? Without one, interrupt()"
             )
-        self._go_on_alone()
-        if self._attempt is None:
-            self._begin(self.autonomous.attempt(context := read_only(context)), context)
-            self._go_on_alone()
-            if self._attempt is None:
-                raise RuntimeError(f"{type(self.autonomous).__name__}.attempt() has to yield at least once")
-        elif context is not self._context and not np.array_equal(context, self._context):
-            raise RuntimeError(f"the attempt under way began in context {self._context}, got {context}; see idle")
-        if not isinstance(self._next, Move):
-            self.movements += 1
-            self._advance(None)
-            self._publish(Event(Kind.RESTED, self._context))
-            return None
-        self._asked = True
-        return self._next
+        if not len(contexts):
+            raise ValueError("ask_many() needs a context for each robot, got none")
+        dim = self.memory.context_dim
+        seen = [None if each is None else check_point("context", each, dim) for each in contexts]
+        for number, context in enumerate(seen):
+            under_way = self.context_at(number)
+            if context is not None and under_way is not None and not np.array_equal(context, under_way):
+                raise RuntimeError(f"the attempt under way began in context {under_way}, got {context}; see idle")
+        asked = [(place, self._propose(place, context)) for place, context in zip(self._places, seen, strict=False)]
+        self._asked = asked
+        return [move if isinstance(move, Move) else None for _, move in asked]
 
-    def request(self, context: ArrayLike) -> Request | None:
+    def request(self, context: ArrayLike, *, place: int = 0) -> Request | None:
         """The request to a teacher before the next movement, or None. `watch` replies with a demonstration; after
         `go_on_alone`, or after `ask` at once, the request stays without a demonstration.
 
         Args:
             context: ``(context_dim,)``, the context of a new attempt if none is under way.
+            place: number of the robot.
 
         Raises:
             ValueError: the context has another shape, or is not finite.
         """
         context = check_point("context", context, self.memory.context_dim)
-        if self._attempt is None:
-            self._begin(self.autonomous.attempt(context := read_only(context)), context)
-            self._untold = True
-        return self._next if isinstance(self._next, Request) else None
+        here = self._place(place)
+        if here.attempt is None:
+            self._begin(here, context)
+        return here.request
 
-    def go_on_alone(self, reply: str) -> None:
+    def go_on_alone(self, reply: str, *, place: int = 0) -> None:
         """Tell the learner that its request gets no demonstration.
 
         Args:
             reply: reason, for the record.
+            place: number of the robot with the request.
 
         Raises:
             RuntimeError: the learner has made no request.
         """
-        if not isinstance(self._next, Request):
+        here = self._place(place)
+        if here.request is None:
             raise RuntimeError("go_on_alone() needs a request, but request() has given none")
-        asked = self._request_event(self._next, reply)
-        self._advance(None)
+        asked = here.asked(here.request, reply)
+        here.advance(None)
+        self._report_new(here)
         self._publish(asked)
 
     def tell(self, outcome: ArrayLike) -> None:
@@ -182,18 +212,39 @@ class Learner:
             ValueError: the outcome has another shape, is not finite or is beyond 1e100. Nothing is remembered, and the
                 learner still waits for an outcome.
         """
-        if not self._asked or not isinstance(self._next, Move):
-            raise RuntimeError("tell() needs the outcome of a movement, but ask() has not proposed one")
-        move, context = self._next, self._context
-        self.memory.add(context, move.theta, outcome)
-        self._asked = False
-        self.movements += 1
-        row = len(self.memory) - 1
-        reached = self.memory.outcomes[-1]
-        self._advance(reached)
-        self._publish(Event(Kind.MOVED, context, move.theta, move.goal, reached, move.origin), row=row)
+        self.tell_many([outcome])
 
-    def watch(self, demonstration: Demonstration, *, who: str | None = None) -> None:
+    def tell_many(self, outcomes: Sequence[ArrayLike | Failure | None]) -> None:
+        """Tell what came of the movements from `ask_many`, in the same order; outcomes enter the memory in this order.
+
+        Args:
+            outcomes: outcome ``(outcome_dim,)`` of each movement, or its `Failure`; None for a rest, or for a robot
+                without a context.
+
+        Raises:
+            RuntimeError: `ask_many` has given no movements.
+            ValueError: there are more or fewer outcomes than movements, a movement has none, or an outcome has another
+                shape, is not finite or is beyond 1e100. Nothing is remembered, and the learner still waits.
+        """
+        asked = self._asked
+        if not asked:
+            raise RuntimeError("tell() needs the outcome of a movement, but ask() has not proposed one")
+        if len(outcomes) != len(asked):
+            raise ValueError(f"tell_many() needs {len(asked)} outcomes, one for each movement, got {len(outcomes)}")
+        told = [self._checked(move, outcome) for (_, move), outcome in zip(asked, outcomes, strict=True)]
+        pairs = [(place, move if isinstance(move, Move) else None) for place, move in asked]
+        self._report_new(
+            *(
+                place
+                for (place, move), outcome in zip(pairs, told, strict=True)
+                if move is not None or not isinstance(outcome, Failure)
+            )
+        )
+        self._asked = []
+        for (place, move), outcome in zip(pairs, told, strict=True):
+            self._tell(place, move, outcome)
+
+    def watch(self, demonstration: Demonstration, *, who: str | None = None, place: int = 0) -> None:
         """Watch a demonstration. A requested demonstration goes to the attempt that requested it. Any other
         demonstration ends the attempt under way, and the social strategy begins with the next ``ask``.
 
@@ -201,30 +252,32 @@ class Learner:
             demonstration: demonstration that is shown.
             who: name of the teacher whose offers a `run` checks before each movement, see ``lesson_waits``; None:
                 the demonstration comes from somebody else.
+            place: number of the robot that uses the demonstration; attempts of other robots go on.
 
         Raises:
             RuntimeError: this learner has no social strategy, or the outcome of the last movement was not told.
             ValueError: the demonstration does not fit the spaces or the correspondence, or theta_d lies outside Pi;
                 the learner is unchanged.
         """
-        request = self._next if isinstance(self._next, Request) else None
-        if self.social is None and request is None:
+        here = self._place(place)
+        if self.social is None and here.request is None:
             raise RuntimeError("this learner has no social strategy, so it cannot be taught; use no teacher")
         if self._asked:
             raise RuntimeError("watch() needs the outcome of the last movement first; was tell() forgotten?")
         theta_d = self.translate(demonstration)
         self._lessons.add(_lesson(demonstration, theta_d))
-        if request is not None:
-            asked, who = self._request_event(request, "shown"), request.teacher
-            self._advance(Lesson(theta_d, demonstration))
-            self._publish(asked, Event(Kind.SHOWN, lesson=demonstration, who=who))
+        if here.request is not None:
+            asked, who = here.asked(here.request, "shown"), here.request.teacher
+            here.advance(Lesson(theta_d, demonstration))
+            self._report_new(here)
+            self._publish(asked)
         elif self.social is not None:
-            self._tell_begun()
-            self._end()
-            self._offered_at = -1 if who is None else self.movements
+            self._report_new()
+            here.end()
+            here.offered_at = -1 if who is None else self.movements
             context = np.asarray(demonstration.context, dtype=np.float64)
-            self._begin(self.social.attempt(context, theta_d, demonstration), context)
-            self._publish(Event(Kind.SHOWN, lesson=demonstration, who=who))
+            here.begin(self.social.attempt(context, theta_d, demonstration), context)
+        self._publish(Event(Kind.SHOWN, lesson=demonstration, who=who, place=place))
 
     def translate(self, demonstration: Demonstration) -> Array:
         """theta_d, eq. (6): the policy that corresponds to a demonstration.
@@ -257,68 +310,97 @@ class Learner:
         Args:
             reason: reason of the failure, for the record.
         """
-        self._stop(Kind.FAILED, reason)
+        if not self._asked:
+            self.ask_many([None])
+        self.tell_many([Failure(reason)] * len(self._asked))
 
     def interrupt(self) -> None:
-        """End the attempt under way, if there is one; its movements so far count. An outcome that was not told is no
-        longer expected."""
-        if self._attempt is not None:
-            self._stop(Kind.INTERRUPTED, None)
+        """End all attempts under way; their movements so far count. Outcomes that were not told are no longer
+        expected."""
+        asked, self._asked = [each for each in self._asked if not isinstance(each[1], Failure)], []
+        if self.idle:
+            return
+        self._report_new(*(place for place, _ in asked))
+        stopped = [
+            place.moved(Kind.INTERRUPTED, move)
+            if isinstance(move, Move)
+            else Event(Kind.INTERRUPTED, place.context, place=place.number)
+            for place, move in asked
+        ]
+        for place in self._places:
+            place.end()
+        self._publish(*(stopped or [Event(Kind.INTERRUPTED, place=-1)]))
 
-    def _go_on_alone(self) -> None:
-        while self.waits_for_answer:
-            self.go_on_alone("nothing")
+    def _place(self, number: int) -> Place:
+        while len(self._places) <= number:
+            self._places.append(Place(len(self._places)))
+        return self._places[number]
 
-    def _stop(self, kind: Kind, reply: str | None) -> None:
-        if self._asked and isinstance(self._next, Move):
-            move = self._next
-            stopped = Event(kind, self._context, move.theta, move.goal, None, move.origin, reply=reply)
+    def _begin(self, place: Place, context: Array) -> None:
+        context = read_only(context)
+        self._new.append(place)
+        place.begin(self.autonomous.attempt(context), context)
+
+    def _propose(self, place: Place, context: Array | None) -> Move | Failure | None:
+        """The next movement at a place; a new attempt begins if none is under way there."""
+        if context is None:
+            return Failure("the robot saw no context")
+        for _ in range(2):  # the attempt under way may end with a request that gets no reply
+            if place.attempt is None:
+                self._begin(place, context)
+            while place.request is not None:
+                self.go_on_alone("nothing", place=place.number)
+            if place.attempt is not None:
+                return place.move
+        raise RuntimeError(f"{type(self.autonomous).__name__}.attempt() has to yield at least once")
+
+    def _checked(self, move: Move | Failure | None, outcome: ArrayLike | Failure | None) -> Array | Failure | None:
+        """What came of a movement; a rest without anything is None."""
+        if isinstance(outcome, Failure):
+            return outcome
+        if isinstance(move, Move) and outcome is not None:
+            return self.memory.check_outcome(move.theta, outcome)
+        if isinstance(move, Move) or outcome is not None:
+            raise ValueError(f"a movement has an outcome or a Failure, a rest has None; got {outcome} for {move}")
+        return move
+
+    def _tell(self, place: Place, move: Move | None, outcome: Array | Failure | None) -> None:
+        """Tell what came of the movement at one place, after its check."""
+        self.movements += 1
+        if isinstance(outcome, Failure):
+            lost = Event(Kind.FAILED, reply=outcome.reason, place=place.number)
+            failed = lost if move is None else place.moved(Kind.FAILED, move, reply=outcome.reason)
+            place.end()
+            self._publish(failed)
+        elif move is None or outcome is None:
+            place.advance(None)
+            self._publish(Event(Kind.RESTED, place.context, place=place.number))
         else:
-            self._tell_begun()
-            stopped = Event(kind, reply=reply)
-        self._end()
-        self.movements += kind == Kind.FAILED
-        self._publish(stopped)
+            assert place.context is not None
+            self.memory.add(place.context, move.theta, outcome)
+            row = len(self.memory) - 1
+            moved = place.moved(Kind.MOVED, move, self.memory.outcomes[-1])
+            place.advance(moved.outcome)
+            self._publish(moved, row=row)
 
     def _publish(self, *events: Event, row: int | None = None) -> None:
-        self._untold = False
         for event in events:
-            self._life.append(event if row is None else row)
+            self._life.append(event if row is None else (row, event.place))
             for listener in self.listeners:
                 listener(event)
 
-    def _request_event(self, request: Request, reply: str) -> Event:
-        goal, who, strategy = request.goal, request.teacher, request.strategy
-        return Event(Kind.ASKED, self._context, goal=goal, who=who, strategy=strategy, reply=reply)
+    def _report_new(self, *reported: Place) -> None:
+        """Publish the beginnings of new attempts, unless the next events, at the places ``reported``, tell them."""
+        begun, self._new = self._begun(reported), []
+        self._publish(*begun)
 
-    @property
-    def _begun_event(self) -> Event:
-        """Event of an attempt without movements so far; replays need it if the attempt ends before a movement."""
-        return Event(Kind.ASKED, self._context)
+    def _begun(self, reported: Sequence[Place]) -> list[Event]:
+        """Events of all new attempts; none if events at the places ``reported`` tell all of them in their order.
 
-    def _tell_begun(self) -> None:
-        if self._untold:
-            self._publish(self._begun_event)
-
-    def _end(self) -> None:
-        if self._attempt is not None:
-            self._attempt.close()
-        self._attempt = self._next = None
-        self._asked, self._untold, self._offered_at = False, False, -1
-
-    def _begin(self, attempt: AskingAttempt, context: Array) -> None:
-        self._context, self._attempt = context, attempt
-        self._advance(None)
-
-    def _advance(self, sent: Array | Lesson | None) -> None:
-        """Go to the next movement, request or rest; ``sent`` is None at the start, or if there was no reply."""
-        attempt, self._attempt, self._next = self._attempt, None, None
-        assert attempt is not None
-        try:
-            self._next = attempt.send(sent)
-        except StopIteration:
-            return
-        self._attempt = attempt
+        A replay begins attempts in the order of the events, so that each draws the same random numbers again.
+        """
+        in_order = self._new == [each for each in reported if each in self._new]
+        return [] if in_order else [each.begun() for each in self._new]
 
 
 def _lesson(demonstration: Demonstration, theta_d: Array) -> tuple[bytes, bytes]:

@@ -19,11 +19,12 @@ class Kind(StrEnum):
     SHOWN = "shown"
     ASKED = "asked"  # request; ``reply`` is its result, and after "shown" the next event is the demonstration
     FAILED = "failed"  # movement without an outcome, for the reason ``reply``; if theta is None, no context was seen
-    INTERRUPTED = "interrupted"  # interruption by the caller; if there is a theta, its outcome was not told
+    INTERRUPTED = "interrupted"  # interruption by the caller, before an outcome was told; place -1: between movements
 
 
 class Event(NamedTuple):
-    """An event, with the fields of its kind; ``who`` is the teacher who has shown something or was asked."""
+    """An event, with the fields of its kind; ``who`` is the teacher who has shown something or was asked, ``place`` the
+    number of the robot if several robots move at once."""
 
     kind: Kind
     context: Array | None = None
@@ -35,6 +36,7 @@ class Event(NamedTuple):
     who: str | None = None
     strategy: str | None = None
     reply: str | None = None
+    place: int = 0
 
 
 class BeforeMovement(NamedTuple):

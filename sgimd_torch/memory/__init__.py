@@ -81,11 +81,18 @@ class Memory:
         """
         context = check_point("context", context, self.context_dim, _NO_CONTEXT)
         theta = check_point("theta", theta, self.theta_dim, "was a goal passed instead?")
+        self._append(context[None], theta[None], self.check_outcome(theta, outcome)[None])
+
+    def check_outcome(self, theta: Array, outcome: ArrayLike) -> Array:
+        """The outcome ``(outcome_dim,)`` of a ``theta`` as float64.
+
+        Raises:
+            ValueError: another shape, or a value is not finite or is beyond 1e100.
+        """
         try:
-            outcome = check_point("outcome", outcome, self.outcome_dim, "did the simulation diverge, or is it a theta?")
+            return check_point("outcome", outcome, self.outcome_dim, "did the simulation diverge, or is it a theta?")
         except ValueError as error:
             raise ValueError(f"{error}; its theta was {theta.tolist()}") from None
-        self._append(context[None], theta[None], outcome[None])
 
     def near_outcomes(self, context: ArrayLike, goal: ArrayLike, k: int) -> Rows:
         """Rows ``(min(k, n),)`` whose contexts and outcomes lie nearest to ``context`` and ``goal`` ``(outcome_dim,)``,

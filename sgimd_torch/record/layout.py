@@ -35,7 +35,7 @@ def layout(dims: Dims) -> dict[str, list[str]]:
     context, theta, goal, outcome = (
         _vector(name, dim) for name, dim in (("context", c), ("theta", p), ("goal", t), ("outcome", t))
     )
-    words = ["demonstration INTEGER", "who TEXT", "strategy TEXT", "reply TEXT"]
+    words = ["demonstration INTEGER", "who TEXT", "strategy TEXT", "reply TEXT", "place INTEGER"]
     evaluated = ["movements INTEGER", "answer TEXT"]
     numbers = ["mean_error REAL", "median_error REAL", "p90_error REAL", "noise_floor REAL", "goals_met INTEGER"]
     predicted = [column for name in ("predicted", "epistemic", "aleatoric") for column in _vector(name, t)]
@@ -65,7 +65,8 @@ def event_row(event: Event, movement: int, lesson: int | None, dims: Dims) -> Ro
         *_cells(event.goal, t),
         *_cells(event.outcome, t),
     )
-    return movement, str(event.kind), event.origin, *vectors, lesson, event.who, event.strategy, event.reply
+    told = lesson, event.who, event.strategy, event.reply, event.place
+    return movement, str(event.kind), event.origin, *vectors, *told
 
 
 def event_reader(dims: Dims, shown: Sequence[Demonstration]) -> Callable[[Row], Event]:
@@ -75,12 +76,12 @@ def event_reader(dims: Dims, shown: Sequence[Demonstration]) -> Callable[[Row], 
 
     def read(row: Row) -> Event:
         context, theta, goal, outcome = (_array(row[part]) for part in parts)
-        lesson, who, strategy, reply = row[-4:]
+        lesson, who, strategy, reply, place = row[-5:]
         kind = Kind(row[1])
         if kind not in _IN_CONTEXT:
             context = None
         told = None if lesson is None else shown[lesson]
-        return Event(kind, context, theta, goal, outcome, row[2], told, who, strategy, reply)
+        return Event(kind, context, theta, goal, outcome, row[2], told, who, strategy, reply, place)
 
     return read
 

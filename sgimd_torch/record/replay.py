@@ -7,7 +7,7 @@ attempt. So `sgimd_torch.record` has to keep nothing but events.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable
+from collections.abc import Generator, Iterable, Iterator
 from typing import Final
 
 import numpy as np
@@ -15,7 +15,7 @@ import numpy as np
 from sgimd_torch.learner import Learner
 from sgimd_torch.learner.events import TEACHER, BeforeMovement, Event, Kind
 from sgimd_torch.parts import Teacher
-from sgimd_torch.spaces import Array, Demonstration, Episode, Request
+from sgimd_torch.spaces import Array, Demonstration, Episode, Failure, Request
 
 _HINT: Final = "was it recorded by another version, on another processor or with another configuration?"
 
@@ -26,7 +26,7 @@ class ReplayError(RuntimeError):
 
 def replay(
     learner: Learner, events: Iterable[Event], *, teacher: Teacher | None = None
-) -> Generator[Episode, None, BeforeMovement]:
+) -> Generator[Episode, None, dict[int, BeforeMovement]]:
     """Let ``learner`` repeat ``events``. Nothing is executed, and no demonstration is requested from anybody.
 
     Args:
@@ -40,67 +40,101 @@ def replay(
         Episodes, as `run` has yielded them.
 
     Returns:
-        Demonstration, request and reply after the last episode.
+        Demonstration, request and reply of each robot after its last episode, by its place.
 
     Raises (when iterated):
         ReplayError: the learner proposes another movement than the recorded one, or the teacher offers another one.
     """
-    offered: Demonstration | None = None
-    asked_at = -1  # index of the movement before which the teacher was asked last
-    before = BeforeMovement()
-    for event in events:
-        index = learner.movements
+    offered: dict[int, Demonstration | None] = {}  # by number of the movement
+    asked_until = 0  # number of the first movement before which the teacher was not asked so far
+    before: dict[int, BeforeMovement] = {}
+    for group in _together(events):
+        event, index = group[0], learner.movements
+        last = index + group[-1].place
         # Between two runs the caller may show something, or begin or end an attempt; no teacher is asked before that.
-        between = event.kind in (Kind.SHOWN, Kind.ASKED, Kind.INTERRUPTED) and event.who is None and event.theta is None
-        if teacher is not None and asked_at < index and not between:
-            asked_at, offered = index, teacher.offer(index, learner.memory)
+        between = event.place < 0 or (event.kind in (Kind.SHOWN, Kind.ASKED) and event.who is None)
+        if teacher is not None and not between:
+            offered |= {k: teacher.offer(k, learner.memory) for k in range(max(asked_until, index), last + 1)}
+            asked_until = max(asked_until, last + 1)
         match event.kind:
             case Kind.SHOWN:
                 if event.who == TEACHER and teacher is not None:
-                    _check_lesson(index, event.lesson, offered)
+                    _check_lesson(last, event.lesson, offered.pop(last, None))
                 if learner.social is None and not learner.waits_for_answer:
-                    found = f"before movement {index} the learner asked for a demonstration, now it does not"
+                    found = f"before movement {last} the learner asked for a demonstration, now it does not"
                     raise ReplayError(f"{found}; is it built in the same way and with the same seed?")
                 assert event.lesson is not None
-                learner.watch(event.lesson, who=event.who)
+                learner.watch(event.lesson, who=event.who, place=event.place)
                 if not between:
-                    offered, before = None, before._replace(demonstration=event.lesson)
+                    offered.pop(last, None)
+                    before[event.place] = _of(before, event)._replace(demonstration=event.lesson)
             case Kind.ASKED:
                 assert event.context is not None
-                learner.request(event.context)
+                learner.request(event.context, place=event.place)
                 if event.who is not None and event.goal is not None:
                     request = Request(event.who, event.goal, event.strategy or "")
-                    before = before._replace(request=request, reply=event.reply or "")
+                    before[event.place] = _of(before, event)._replace(request=request, reply=event.reply or "")
                     if event.reply != "shown":
-                        learner.go_on_alone(event.reply or "")
+                        learner.go_on_alone(event.reply or "", place=event.place)
             case Kind.INTERRUPTED if between:
                 learner.interrupt()
-                asked_at = -1  # the resumed run asked its teacher once more
-            case Kind.FAILED if event.theta is None:
-                learner.fail(event.reply or "")
-                yield Episode(
-                    index, np.full(learner.memory.context_dim, np.nan), None, None, *before, event.reply or ""
-                )
-                before = BeforeMovement()
+                asked_until = index  # the resumed run asked its teacher once more
             case _:
-                assert event.context is not None
-                _check_lesson(index, None, offered)
-                move = learner.ask(event.context)
-                _check_repeats(index, "theta", event.theta, None if move is None else move.theta)
-                if event.goal is not None:
-                    _check_repeats(index, "goal", event.goal, None if move is None else move.goal)
+                for number in range(index, last + 1):
+                    _check_lesson(number, None, offered.pop(number, None))
+                places = [each.place for each in group]
+                contexts: list[Array | None] = [None] * (places[-1] + 1)
+                for each in group:
+                    contexts[each.place] = None if _unseen(each) else each.context
+                moves = learner.ask_many(contexts)
+                for each in group:
+                    number, move = index + each.place, moves[each.place]
+                    _check_repeats(number, "theta", each.theta, None if move is None else move.theta)
+                    if each.goal is not None:
+                        _check_repeats(number, "goal", each.goal, None if move is None else move.goal)
                 if event.kind == Kind.INTERRUPTED:
                     learner.interrupt()
-                    asked_at = -1  # the resumed run asked its teacher once more
+                    asked_until = index  # the resumed run asked its teacher once more
                     continue
-                failed = (event.reply or "") if event.kind == Kind.FAILED else ""
-                if event.kind == Kind.FAILED:
-                    learner.fail(failed)
-                elif event.outcome is not None:
-                    learner.tell(event.outcome)
-                yield Episode(index, event.context, move, event.outcome, *before, failed)
-                before = BeforeMovement()
+                learner.tell_many([_told(each) for each in group])
+                for each in group:
+                    failed = (each.reply or "") if each.kind == Kind.FAILED else ""
+                    context = each.context
+                    if context is None or _unseen(each):
+                        context = np.full(learner.memory.context_dim, np.nan)
+                    caused = before.pop(each.place, BeforeMovement())
+                    yield Episode(index + each.place, context, moves[each.place], each.outcome, *caused, failed)
     return before
+
+
+def _together(events: Iterable[Event]) -> Iterator[list[Event]]:
+    """Events one by one, but all movements that were made at once together, in the order of their places."""
+    group: list[Event] = []
+    for event in events:
+        moved = event.kind not in (Kind.SHOWN, Kind.ASKED) and event.place >= 0
+        same = group and (event.kind == Kind.INTERRUPTED) == (group[-1].kind == Kind.INTERRUPTED)
+        if group and not (moved and same and event.place > group[-1].place):
+            yield group
+            group = []
+        if moved:
+            group.append(event)
+        else:
+            yield [event]
+    if group:
+        yield group
+
+
+def _of(before: dict[int, BeforeMovement], event: Event) -> BeforeMovement:
+    return before.get(event.place, BeforeMovement())
+
+
+def _unseen(event: Event) -> bool:
+    """Whether the robot failed before it could see a context."""
+    return event.kind == Kind.FAILED and event.theta is None
+
+
+def _told(event: Event) -> Array | Failure | None:
+    return Failure(event.reply or "") if event.kind == Kind.FAILED else event.outcome
 
 
 def _check_repeats(index: int, name: str, recorded: Array | None, now: Array | None) -> None:

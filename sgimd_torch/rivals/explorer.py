@@ -11,7 +11,7 @@ import numpy as np
 
 from sgimd_torch.parts import Problem, Social, Strategy
 from sgimd_torch.spaces import Array, Attempt, Demonstration, Move
-from sgimd_torch.strategies import Mimic
+from sgimd_torch.strategies import Mimic, watched
 
 if TYPE_CHECKING:
     from ribs.schedulers import Scheduler
@@ -24,7 +24,8 @@ class QualityDiversity(Strategy):
     a movement from the middle of Pi, relative to the sides of Pi. An outcome outside T counts in the nearest border
     cell of T. If T is far larger than the reachable part, most outcomes fall into a few cells, so there are few elites.
 
-    Each attempt is one movement. If an attempt is interrupted before its outcome, the next attempt repeats it.
+    Each attempt is one movement. If an attempt is interrupted before its outcome, the next attempt repeats it. Several
+    robots at once may repeat the first movement of a batch near its end, because the next batch is not known yet.
 
     Args:
         problem: problem to learn; exemplars of its memory are in the archive from the start.
@@ -40,16 +41,23 @@ class QualityDiversity(Strategy):
         self.archive = scheduler.archive
         self._scheduler = scheduler
         self._origin = origin
+        self._under_way: list[int] = []  # rows of the batch that are being executed
         if len(problem.memory):
             self.add(problem.memory.thetas, problem.memory.outcomes)
         self._ask()
 
     def attempt(self, context: Array) -> Attempt:
         """The next movement of the batch."""
-        theta = self.policies.low + self.policies.sides * self._batch[len(self._outcomes)]
-        outcome = yield Move(self.policies.clip(theta), None, self._origin)
-        self._outcomes.append(outcome)
-        if len(self._outcomes) == len(self._batch):
+        batch, outcomes = self._batch, self._outcomes
+        open_ = [row for row in range(len(batch)) if row not in self._under_way and row not in outcomes]
+        row = open_[0] if open_ else 0
+        self._under_way.append(row)
+        try:
+            theta = self.policies.low + self.policies.sides * batch[row]
+            outcomes[row] = yield Move(self.policies.clip(theta), None, self._origin)
+        finally:  # interruption included
+            self._under_way.remove(row)
+        if batch is self._batch and len(outcomes) == len(batch):
             self._tell()
             self._ask()
 
@@ -60,10 +68,11 @@ class QualityDiversity(Strategy):
 
     def _ask(self) -> None:
         self._batch: Array = self._scheduler.ask()  # (n, theta_dim)
-        self._outcomes: list[Array] = []
+        self._outcomes: dict[int, Array] = {}  # by row of the batch
 
     def _tell(self) -> None:
-        self._scheduler.tell(objectives_of(self._batch), np.stack(self._outcomes))
+        outcomes = np.stack([self._outcomes[row] for row in range(len(self._batch))])
+        self._scheduler.tell(objectives_of(self._batch), outcomes)
 
 
 class Shown(Social):
@@ -75,21 +84,12 @@ class Shown(Social):
 
     def attempt(self, context: Array, theta_d: Array, demonstration: Demonstration) -> Attempt:
         """The movements of the imitation."""
-        thetas: list[Array] = []
-        outcomes: list[Array] = []
-        moves = self.mimic.attempt(context, theta_d, demonstration)
-        move = next(moves, None)
+        executed: list[tuple[Array, Array]] = []
         try:
-            while move is not None:
-                outcome = yield move
-                thetas.append(move.theta)
-                outcomes.append(outcome)
-                try:
-                    move = moves.send(outcome)
-                except StopIteration:
-                    return
+            yield from watched(self.mimic.attempt(context, theta_d, demonstration), executed)
         finally:  # interruption by the next demonstration included
-            if outcomes:
+            if executed:
+                thetas, outcomes = zip(*executed, strict=True)
                 self.explorer.add(np.stack(thetas), np.stack(outcomes))
 
 

@@ -161,21 +161,20 @@ def _lived(record: Record) -> tuple[dict[str, Any], Columns | None, int]:
     """Movements as arrays by attribute of `Run`, requests as columns or None, and the number of failed movements."""
     c, p, t = record.dims
     origins, shown, cells, requests = list[str](), array("q"), array("d"), list[dict[str, Any]]()
-    last, failed = -1, 0
-    for _, kind, origin, *vectors, lesson, who, strategy, reply in record.rows("events"):
+    lessons, failed = dict[int, int](), 0  # lessons by number of the next movement of the robot that was shown them
+    for _, kind, origin, *vectors, lesson, who, strategy, reply, place in record.rows("events"):
         if lesson is not None:
-            last = lesson
+            lessons[len(origins) + place] = lesson
             if requests and requests[-1]["reply"] == "shown" and requests[-1]["shown"] < 0:
                 requests[-1]["shown"] = lesson
         elif kind == Kind.ASKED and who is not None:
-            asked = {"index": len(origins), "teacher": who, "strategy": strategy, "reply": reply, "shown": -1}
+            asked = {"index": len(origins) + place, "teacher": who, "strategy": strategy, "reply": reply, "shown": -1}
             wanted = enumerate((*vectors[:c], *vectors[c + p : c + p + t]))
             requests.append(asked | {f"wanted_{k}": value for k, value in wanted})
         elif kind in (Kind.MOVED, Kind.RESTED, Kind.FAILED):
             failed += kind == Kind.FAILED
+            shown.append(lessons.pop(len(origins), -1))
             origins.append(origin or "")
-            shown.append(last)
-            last = -1
             cells.extend(np.nan if value is None else value for value in vectors)
     n = len(origins)
     vectors_of = np.split(np.array(cells).reshape(n, c + p + 2 * t), (c, c + p, c + p + t), axis=1)

@@ -9,7 +9,7 @@ import pytest
 
 from sgimd_torch.environments.check import check_environment
 from sgimd_torch.environments.fishing_rod import HOLD, JOINT_RANGES, JOINTS, MODEL, FishingRod
-from sgimd_torch.environments.protocol import SimulationError
+from sgimd_torch.environments.protocol import SimulationError, execute_many
 from sgimd_torch.environments.rod_physics import TOP_SPEED, Caster
 from sgimd_torch.spaces import Array, Box, stream
 
@@ -261,8 +261,10 @@ def test_a_diverged_movement_in_a_batch_is_the_one_that_is_named() -> None:
     fragile, still, moving = unstable(), np.full(25, 0.5), movements(1)[0]
     still[-1] = moving[-1] = 0.0  # short enough for the line at rest to stay at rest
     cast(fragile, still)
+    batch = np.zeros((2, 0)), np.stack((still, moving)), [stream(i, "environment") for i in (0, 1)]
+    assert np.isfinite(fragile.execute_many(*batch)).all(axis=1).tolist() == [True, False]
     with pytest.raises(SimulationError) as raised:
-        fragile.execute_many(np.zeros((2, 0)), np.stack((still, moving)), [stream(i, "environment") for i in (0, 1)])
+        execute_many(fragile, *batch)
     assert np.array_equal(raised.value.theta, moving)
 
 

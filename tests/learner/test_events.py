@@ -16,7 +16,7 @@ from sgimd_torch.learner.events import Kind
 from sgimd_torch.record import Record
 from sgimd_torch.record.lives import load_life, save_life
 from sgimd_torch.session import run
-from sgimd_torch.spaces import Demonstration, stream
+from sgimd_torch.spaces import Demonstration, Failure, Move, stream
 from sgimd_torch.teach.by_hand import ByHand
 from sgimd_torch.teachers import AskedTeacher, PeriodicTeacher
 from worlds import demonstrate, last_posture
@@ -41,25 +41,34 @@ LEARNERS = {
 }
 
 
-def act(learner, what, k):
+def act(learner, what, k, place=0):
     """What a caller may do with a learner, if it is possible now; ``k`` chooses the context and the lesson."""
-    context = CONTEXTS[k % 2] if learner.idle else learner.context
+    first, context = (CONTEXTS[k % 2] if (here := learner.context_at(each)) is None else here for each in (0, place))
     waits_for_outcome = learner._asked
     match what:
-        case "move" if not waits_for_outcome:
-            move = learner.ask(context)
-            if move is not None:
-                learner.tell(ARM.execute(context, move.theta, stream(k, "noise")))
-        case "ask" if not waits_for_outcome:
-            learner.ask(context)
+        case "ask many" | "ask some" if not waits_for_outcome:
+            under_way = [learner.context_at(place) for place in range(1 + k)]
+            contexts = [CONTEXTS[n % 2] if each is None else each for n, each in enumerate(under_way)]
+            if what == "ask some":
+                contexts[place % len(contexts)] = None
+            learner.ask_many(contexts)
         case "tell" if waits_for_outcome:
-            learner.tell([0.1 * k, 0.2])
+            outcomes = [np.array([0.1 * k, 0.2]) if isinstance(each, Move) else None for _, each in waits_for_outcome]
+            learner.tell_many([Failure("lost") if n == k else each for n, each in enumerate(outcomes)])
+        case "move" if not waits_for_outcome:
+            move = learner.ask(first)
+            if move is not None:
+                learner.tell(ARM.execute(first, move.theta, stream(k, "noise")))
+        case "ask" if not waits_for_outcome:
+            learner.ask(first)
         case "request" if not waits_for_outcome:
-            learner.request(context)
-        case "alone" if learner.waits_for_answer:
-            learner.go_on_alone("nothing")
-        case "teacher" | "by-hand" | None if not waits_for_outcome and (learner.social or learner.waits_for_answer):
-            learner.watch(LESSONS[k], who=what)
+            learner.request(context, place=place)
+        case "alone" if learner._places[place].request:
+            learner.go_on_alone("nothing", place=place)
+        case "teacher" | "by-hand" | None if not waits_for_outcome and (
+            learner.social or learner._places[place].request
+        ):
+            learner.watch(LESSONS[k], who=what, place=place)
         case "fail":
             learner.fail("lost")
         case "interrupt":
@@ -67,13 +76,17 @@ def act(learner, what, k):
 
 
 WHATS = ["move", "ask", "tell", "request", "alone", "teacher", "by-hand", None, "fail", "interrupt"]
-ACTS = st.lists(st.tuples(st.sampled_from([*["move"] * 5, *WHATS]), st.integers(0, len(LESSONS) - 1)), max_size=25)
+CHOICES = st.integers(0, len(LESSONS) - 1)
+ALONE = st.tuples(st.sampled_from([*["move"] * 5, *WHATS]), CHOICES)
+TOGETHER = st.tuples(st.sampled_from([*["ask many", "tell"] * 5, "ask some", *WHATS]), CHOICES, st.integers(0, 2))
+ACTS = st.lists(ALONE, max_size=25) | st.lists(TOGETHER, max_size=25)
 
 
 def state(learner):
     """What a caller can see of a learner."""
-    memory, under_way = learner.memory, None if learner.idle else learner.context.tolist()
-    seen = learner.movements, under_way, learner.waits_for_answer, learner.lesson_waits
+    memory, under_way = learner.memory, [str(learner.context_at(place)) for place in range(6)]
+    waits = [learner.lesson_waits_at(place) for place in range(6)]
+    seen = learner.movements, under_way, learner.waits_for_answer, waits
     known = [each.tobytes() for each in (memory.contexts, memory.thetas, memory.outcomes)]
     return (*seen, *known, [learner.was_shown(each) for each in LESSONS], [str(each) for each in learner.regions])
 
@@ -92,8 +105,10 @@ def test_whatever_has_happened_a_life_that_is_loaded_becomes_the_same_learner(tm
         act(whole, *each)
     save_life(whole, path)
     load_life(again, path)
-    if whole._asked:  # this movement is asked for again
-        assert np.array_equal(again.ask(whole.context).theta, whole._next.theta)
+    if whole._asked:  # these movements are asked for again
+        again.ask_many([None if isinstance(each, Failure) else place.context for place, each in whole._asked])
+        for (_, mine), (_, theirs) in zip(whole._asked, again._asked, strict=True):
+            assert repr(mine) == repr(theirs)
     assert state(again) == state(whole)
     for each in later:
         act(whole, *each)
@@ -197,10 +212,9 @@ def lived(path, movements, events=()):
     teachers = {"ann": AnsweringTeacher(LESSONS[:4], stream(0, "ann"), takes=2)}
     learner = sgim_acts(ARM, 0, teachers=teachers, **TAUGHT, **SEARCHING)
 
-    def execute(index, context, theta):
-        if index % 7 == 6:
-            raise ConnectionError("lost")
-        return ARM.execute(context, theta, stream(0, "environment", index))
+    def execute(indices, contexts, thetas):
+        moves = zip(indices, contexts, thetas, strict=True)
+        return [Failure("lost") if i % 7 == 6 else ARM.execute(c, t, stream(0, "environment", i)) for i, c, t in moves]
 
     with Record.make(path, DIMS, {}) as record:
         for event in events:

@@ -20,7 +20,7 @@ from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.session import NoOutcomeError, run
-from sgimd_torch.spaces import Array, Episode, stream
+from sgimd_torch.spaces import Array, Episode, Failure, stream
 from sgimd_torch.teachers import PeriodicTeacher
 from worlds import demonstrations
 
@@ -122,10 +122,13 @@ def failing_life(path: Path, movements: int):
     learner = sgim_d(arm, 0, correspondence=arm.correspondence)
     teacher = PeriodicTeacher(demonstrations(arm), stream(0, "teacher"), every=20)
 
-    def moved(index: int, context: Array, theta: Array) -> Array:
-        if index in lost:
-            raise ConnectionError("lost")
-        return arm.execute(context, theta, stream(0, "environment", index))
+    def moved(indices, contexts, thetas):
+        ((index, context, theta),) = zip(indices, contexts, thetas, strict=True)
+        return [
+            Failure("ConnectionError: lost")
+            if index in lost
+            else arm.execute(context, theta, stream(0, "environment", index))
+        ]
 
     with Record.make(path, DIMS, {}) if not path.exists() else Record(path, write=True) as record:
         episodes = list(run(learner, arm, 0, movements=movements, teacher=teacher, execute=moved, record=record))

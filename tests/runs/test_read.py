@@ -33,11 +33,11 @@ def test_the_arrays_of_a_run_are_the_rows_of_its_record(reference, undisturbed):
     run = read_run(undisturbed)
     moved = [row for row in reference["events"] if row[1] == Kind.MOVED]
     found = np.hstack((run.contexts, run.thetas, run.goals, run.outcomes))
-    np.testing.assert_array_equal(found, np.array([row[3:-4] for row in moved], dtype=np.float64))
+    np.testing.assert_array_equal(found, np.array([row[3:-5] for row in moved], dtype=np.float64))
     assert run.origin.tolist() == [row[2] for row in moved]
     assert run.index.tolist() == list(range(90))
     before = [reference["events"][k - 1] for k, row in enumerate(reference["events"]) if row[1] == Kind.MOVED]
-    shown = [row[-4] if row[1] == Kind.SHOWN else -1 for row in before]
+    shown = [row[-5] if row[1] == Kind.SHOWN else -1 for row in before]
     assert run.demonstration.tolist() == shown
     assert run.benchmark.tolist() == [[0.0, 0.6], [0.3, 0.5], [-0.4, 0.4]]
     assert {name: len(column) for name, column in run.errors.items() if name != "context"} == dict.fromkeys(

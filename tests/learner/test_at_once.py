@@ -1,0 +1,232 @@
+"""Several robots move at once: one learner, an attempt for each robot, and a life that repeats bit for bit."""
+
+import numpy as np
+import pytest
+
+from sgimd_torch.algorithms.practice import practice, practice_taught
+from sgimd_torch.asking.algorithms import SEARCHING, sgim_acts
+from sgimd_torch.asking.teachers import AnsweringTeacher
+from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.learner.events import Kind
+from sgimd_torch.record import Record
+from sgimd_torch.session import NoOutcomeError, run
+from sgimd_torch.spaces import Failure, Move, stream
+from sgimd_torch.teachers import PeriodicTeacher, at_once
+from worlds import ALGORITHMS, NO_CONTEXT, TAUGHT, demonstrations, last_posture, make
+
+ARM = PlanarArm(5, noise=0.01)
+SHOWN = demonstrations(ARM)
+LEARNERS = {
+    **{name: lambda name=name: make(name, ARM) for name in ALGORITHMS},
+    "practice": lambda: practice(ARM, 0),
+    "practice-taught": lambda: practice_taught(ARM, 0, correspondence=last_posture),
+    "asking": lambda: sgim_acts(ARM, 0, teachers=teachers(), correspondence=last_posture, **SEARCHING),
+}
+
+
+def teachers():
+    return {"ann": AnsweringTeacher(SHOWN[:5], stream(0, "ann"), takes=2)}
+
+
+class Lossy(PlanarArm):
+    """Loses one movement in nine, known by its stream."""
+
+    execute_many = None
+
+    def execute(self, context, theta, rng):
+        if rng.random() < 1 / 9:
+            raise ConnectionError("lost")
+        return super().execute(context, theta, rng)
+
+
+def lived(name, path, movements, at_once, *, events=(), robot=ARM):
+    """The learner, its episodes and its rows, after ``movements`` that go on from these ``events``."""
+    learner = LEARNERS[name]()
+    given = {"teachers": teachers()} if name == "asking" else {}
+    if name in {*TAUGHT, "practice-taught"}:
+        given["teacher"] = PeriodicTeacher(SHOWN, stream(0, "teacher"), every=11)
+    with Record.make(path, (0, 5, 2), {}) as record:
+        for event in events:
+            record.add(event)
+        episodes = list(run(learner, robot, 0, movements=movements, at_once=at_once, record=record, **given))
+        record.commit()
+        return learner, episodes, list(record.rows("events")), list(record.events())
+
+
+@pytest.mark.parametrize("name", LEARNERS)
+@pytest.mark.parametrize("robot", [ARM, Lossy(5, noise=0.01)], ids=["arm", "lossy"])
+def test_a_life_of_several_robots_goes_on_from_any_of_its_groups_as_if_never_stopped(name, robot, tmp_path):
+    learner, episodes, whole, events = lived(name, tmp_path / "whole", 48, 4, robot=robot)
+    assert [episode.index for episode in episodes] == list(range(48))
+    for movement in (4, 16, 28, 44):
+        kept = [event for event, row in zip(events, whole, strict=True) if row[0] < movement]
+        again, repeated, rows, _ = lived(name, tmp_path / str(movement), 48, 4, events=kept, robot=robot)
+        assert rows == whole
+        assert np.array_equal(again.memory.outcomes, learner.memory.outcomes)
+        for mine, theirs in zip(episodes, repeated, strict=True):
+            same = (mine.index, mine.reply, mine.failed) == (theirs.index, theirs.reply, theirs.failed)
+            assert same
+            assert (mine.demonstration is None) == (theirs.demonstration is None)
+
+
+@pytest.mark.parametrize("name", LEARNERS)
+def test_one_robot_at_once_is_the_usual_life(name, tmp_path):
+    usual, together = (lived(name, tmp_path / str(n), 60, 1)[2] for n in range(2))
+    assert usual == together
+
+
+def test_no_movement_of_a_group_knows_the_outcome_of_another():
+    arm = PlanarArm(5)
+    first, other = practice(arm, 0), practice(arm, 0)
+    for learner, scale in ((first, 1.0), (other, -1.0)):
+        for _ in range(5):
+            moves = learner.ask_many([NO_CONTEXT] * 4)
+            learner.tell_many([arm.execute(NO_CONTEXT, move.theta, stream(0, "noise")) for move in moves])
+        learner.told = [move.theta for move in learner.ask_many([NO_CONTEXT] * 4)]
+        learner.tell_many([scale * np.array([0.1, 0.2 * k]) for k in range(4)])
+    assert np.array_equal(first.told, other.told)
+    assert not np.array_equal(first.ask(NO_CONTEXT).theta, other.ask(NO_CONTEXT).theta)
+
+
+def test_a_demonstration_goes_to_the_robot_of_its_movement_and_the_others_go_on():
+    learner = LEARNERS["practice-taught"]()
+    teacher = PeriodicTeacher(SHOWN, stream(0, "teacher"), every=10)
+    episodes = list(run(learner, ARM, 0, movements=40, at_once=4, teacher=teacher))
+    shown = [episode for episode in episodes if episode.demonstration is not None]
+    assert [episode.index for episode in shown] == [10, 20, 30]
+    for episode in episodes:
+        imitates = episode.move.origin == "imitate"
+        assert imitates == (episode.demonstration is not None)
+        assert not imitates or np.array_equal(episode.move.theta, episode.demonstration.trajectory[-1])
+
+
+def test_all_demonstrations_at_the_start_are_imitated_at_once():
+    learner = LEARNERS["practice-taught"]()
+    teacher = at_once(SHOWN, stream(0, "teacher"))
+    episodes = list(run(learner, ARM, 0, movements=24, at_once=8, teacher=teacher))
+    assert [episode.move.origin == "imitate" for episode in episodes] == [True] * 20 + [False] * 4
+
+
+def test_an_imitation_of_one_robot_goes_on_for_group_after_group():
+    learner = make("sgim-d", ARM)
+    list(run(learner, ARM, 0, movements=20, at_once=2))
+    learner.watch(SHOWN[0], place=1)
+    origins = [[move.origin for move in asked(learner, 2)] for _ in range(12)]
+    assert [pair[1] == "imitate" for pair in origins] == [True] * 10 + [False] * 2
+    assert "imitate" not in [pair[0] for pair in origins]
+
+
+def asked(learner, robots):
+    """The next movements of ``robots``, executed."""
+    moves = learner.ask_many([NO_CONTEXT] * robots)
+    learner.tell_many([None if move is None else ARM.execute(NO_CONTEXT, move.theta, stream(0, "n")) for move in moves])
+    return moves
+
+
+def test_a_robot_that_fails_ends_its_own_attempt_alone():
+    learner = make("sgim-d", ARM)
+    for place in range(3):
+        learner.watch(SHOWN[place], place=place)
+    moves = learner.ask_many([NO_CONTEXT] * 3)
+    learner.tell_many([[0.1, 0.1], Failure("lost"), [0.2, 0.2]])
+    assert [learner.context_at(place) is None for place in range(3)] == [False, True, False]
+    assert (len(learner.memory), learner.movements) == (2, 3)
+    assert [str(event.kind) for event in learner.events()][-3:] == ["moved", "failed", "moved"]
+    assert np.array_equal(list(learner.events())[-2].theta, moves[1].theta)
+
+
+def test_attempts_of_robots_in_other_contexts_keep_their_contexts():
+    arm = PlanarArm(3, context=True)
+    learner = practice(arm, 0)
+    contexts = np.array([[0.1], [-0.3], [0.7]])
+    moves = learner.ask_many(contexts)
+    learner.tell_many([arm.execute(c, move.theta, stream(0, "n")) for c, move in zip(contexts, moves, strict=True)])
+    assert np.array_equal(learner.memory.contexts, contexts)
+
+
+def test_outcomes_that_were_not_told_are_not_expected_after_an_interruption():
+    learner = practice(ARM, 0)
+    learner.ask_many([NO_CONTEXT] * 3)
+    learner.interrupt()
+    assert [event.kind for event in learner.events()] == [Kind.INTERRUPTED] * 3
+    assert learner.idle
+    assert learner.movements == 0
+    assert all(isinstance(move, Move) for move in learner.ask_many([NO_CONTEXT] * 3))
+
+
+RIGHT = [[0.1, 0.2]] * 3
+
+
+@pytest.mark.parametrize(
+    ("outcomes", "error"),
+    [
+        (RIGHT[:2], "tell_many.. needs 3 outcomes, one for each movement, got 2"),
+        ([*RIGHT, [0.1, 0.2]], "needs 3 outcomes, one for each movement, got 4"),
+        ([*RIGHT[:2], [np.nan, 0.2]], r"outcome must be finite .*entry \[0\] is nan.*theta was"),
+        ([*RIGHT[:2], [0.2]], r"outcome must have shape .*2"),
+        ([*RIGHT[:2], None], "a movement has an outcome or a Failure, a rest has None"),
+    ],
+)
+def test_wrong_outcomes_leave_the_learner_waiting(outcomes, error):
+    learner = practice(ARM, 0)
+    learner.ask_many([NO_CONTEXT] * 3)
+    with pytest.raises(ValueError, match=error):
+        learner.tell_many(outcomes)
+    assert (len(learner.memory), learner.movements, list(learner.events())) == (0, 0, [])
+    learner.tell_many(RIGHT)
+    assert len(learner.memory) == 3
+
+
+def test_telling_out_of_turn_and_asking_for_nobody_are_refused():
+    learner = practice(ARM, 0)
+    with pytest.raises(RuntimeError, match=r"ask.. has not proposed one"):
+        learner.tell_many(RIGHT)
+    with pytest.raises(ValueError, match="a context for each robot, got none"):
+        learner.ask_many([])
+    learner.ask_many([NO_CONTEXT] * 2)
+    with pytest.raises(RuntimeError, match=r"was tell.. forgotten"):
+        learner.ask_many([NO_CONTEXT] * 2)
+
+
+class Together(PlanarArm):
+    """Does to a whole group what a test wants."""
+
+    def __init__(self, outcomes):
+        super().__init__(5)
+        self.outcomes_of = outcomes
+
+    def execute_many(self, contexts, thetas, rngs):
+        return self.outcomes_of(super().execute_many(contexts, thetas, rngs))
+
+
+def with_a_hole(outcomes):
+    outcomes[1] = np.nan
+    return outcomes
+
+
+def lost(outcomes):
+    raise ConnectionError("unplugged")
+
+
+@pytest.mark.parametrize(
+    ("outcomes", "failed"),
+    [
+        (with_a_hole, ["", "outcome must be finite", "", ""]),
+        (lost, ["ConnectionError: unplugged"] * 4),
+        (lambda outcomes: outcomes[:2], ["ValueError: execute_many() must give 4 outcomes in rows"] * 4),
+    ],
+)
+def test_what_execute_many_does_wrong_fails_the_movements_that_it_concerns(outcomes, failed):
+    robot = Together(outcomes)
+    episodes = list(run(practice(robot, 0), robot, 0, movements=4, at_once=4))
+    for episode, reason in zip(episodes, failed, strict=True):
+        assert reason in episode.failed
+        assert bool(reason) == bool(episode.failed)
+
+
+def test_too_many_failures_end_the_run_after_the_whole_group():
+    robot, episodes = Together(lost), []
+    learner = practice(robot, 0)
+    with pytest.raises(NoOutcomeError, match="3 movements in a row failed, the last one: ConnectionError: unplugged"):
+        episodes.extend(run(learner, robot, 0, movements=40, at_once=4, failures=3))
+    assert learner.movements == 4
