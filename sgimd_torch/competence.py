@@ -56,13 +56,16 @@ class Competence(Judge):
 
         Further calls with the same context and goal, as during an attempt, compare only newer exemplars.
         """
-        asked = np.asarray(context).tobytes(), np.asarray(goal).tobytes()
+        asked = context.tobytes(), goal.tobytes()
         if asked != self._asked:
             self._nearest = self.problem.memory.nearest(context, goal)
             self._asked, self._row, self._best = asked, None, -1.0
+            self._far = max(float(_distance(goal, self.problem.rest)), self.problem.tolerance)
         if (row := self._nearest.row) != self._row:
             assert row is not None
-            self._row, self._best = row, _best(self.problem, goal, self.problem.memory.outcomes[row : row + 1])
+            # `performance` without its general shapes, as each movement asks for it
+            missed = float(_distance(goal, self.problem.memory.outcomes[row]))
+            self._row, self._best = row, -min(1.0, missed / self._far)
         return self._best
 
 

@@ -197,7 +197,7 @@ class Box:
 
     def clip(self, points: ArrayLike) -> Array:
         """``(..., dim)``, the nearest points inside."""
-        return np.asarray(points, dtype=np.float64).clip(self.low, self.high)
+        return np.minimum(np.maximum(points, self.low), self.high)
 
     def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
         """``(...)``, whether each of the points ``(..., dim)`` lies inside, the border included."""

@@ -156,7 +156,8 @@ class GoalBabbling(Strategy):
         if share is not None:
             return share
         # Deviation: the paper's probability is -J. Here it is clipped, so that both regimes are always possible.
-        return float(np.clip(-self.competence(context, goal), *self.global_range))
+        least, greatest = self.global_range
+        return min(max(-self.competence(context, goal), least), greatest)
 
     def _optimise(self, context: Array, goal: Array) -> Attempt:
         """Movements of a search that begins at the estimate of the inverse model, until the search ends."""

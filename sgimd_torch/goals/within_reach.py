@@ -9,6 +9,7 @@ the box, so that the box can grow. The step is wide at first, and narrows if goa
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 import numpy as np
@@ -77,15 +78,16 @@ class WithinReach(UniformGoals):
         super().add(context, goal, competence, strategy, gain)
         if self._reach is None:
             return
-        beyond = float(np.linalg.norm(goal - np.clip(goal, *self._reach)))
-        missed = float(np.linalg.norm(goal - self.problem.memory.outcomes[-1]))
+        goal, (low, high) = np.asarray(goal, dtype=np.float64), self._reach
+        beyond = math.dist(goal, np.minimum(np.maximum(goal, low), high))
+        missed = math.dist(goal, self.problem.memory.outcomes[-1])
         if beyond == 0:
             median = self._missed or missed
             self._missed = median * _MEDIAN if missed > median else median / _MEDIAN
         elif len(self.problem.memory) >= _WIDE_FOR:
             met = missed < max(beyond, self._missed)
             step = self._step * _FACTOR if met else self._step / _FACTOR ** (1 / 3)
-            self._step = float(np.clip(step, _NARROWEST, _WIDEST))
+            self._step = min(max(step, _NARROWEST), _WIDEST)
 
     def _look(self) -> None:
         """Update the box."""
@@ -93,7 +95,7 @@ class WithinReach(UniformGoals):
         n = self._looked = len(memory)
         rows = np.arange(0, n, 1 + n // _LOOKED_AT)
         alike = memory.neighbourhoods(rows, min(_ALIKE, n // _FIRST))
-        means = [memory.outcomes[each].mean(axis=0) for each in alike]
+        means = memory.outcomes[alike].mean(axis=1)
         reach = np.quantile(means, (_TAIL, 1 - _TAIL), axis=0)
         if np.ptp(reach, axis=0).max() > _ROUNDING * space.sides.max():
             self._reach = reach

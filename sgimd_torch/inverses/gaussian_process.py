@@ -3,7 +3,7 @@
 Our addition, not in the paper; Rasmussen & Williams (2006), chapters 2 and 5. All outcome dimensions share one kernel,
 smooth plus rough, both Matern 5/2. The rough part explains what the smooth part cannot, so that only the noise stated
 by the environment counts as noise.
-    kernel = choose_kernel(groups, noise); process = Process(inputs, outcomes, kernel); process.predict(candidates)
+    lengths = fit_lengths(inputs, outcomes); kernel = choose_kernel(groups, noise)
 Each input is divided by its length scale, see ``fit_lengths``; inputs are then "in lengths".
 """
 
@@ -14,11 +14,12 @@ from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple, ParamSpec, TypeVar
 
 import numpy as np
-from scipy.linalg import solve_triangular
+from scipy.linalg import cho_solve, cholesky
+from scipy.linalg.lapack import dpotri
 from scipy.optimize import minimize
 from threadpoolctl import ThreadpoolController
 
-from sgimd_torch.memory import Rows
+from sgimd_torch.memory.compiled import compiled
 from sgimd_torch.spaces import Array
 
 _BLAS: Final = ThreadpoolController()
@@ -56,78 +57,6 @@ class Kernel(NamedTuple):
         distances = self.scale * np.sqrt(squared)
         return (1 - self.share) * _matern(distances) + self.share * _matern(self.finer * distances)
 
-    def slope(self, squared: Array) -> Array:
-        """Derivative of the covariance by the input, divided by the difference of the inputs."""
-        distances = self.scale * np.sqrt(squared)
-        rough = self.finer**2 * _matern_slope(self.finer * distances)
-        return self.scale**2 * ((1 - self.share) * _matern_slope(distances) + self.share * rough)
-
-
-class Process:
-    """Gaussian process given some movements.
-
-    Args:
-        inputs: ``(n, dim)``, theta and context in lengths.
-        outcomes: ``(n, outcome_dim)``.
-        kernel: kernel of variance 1; the process multiplies it by the most likely variance.
-    """
-
-    def __init__(self, inputs: Array, outcomes: Array, kernel: Kernel) -> None:
-        self.outcomes, self.kernel = outcomes, kernel
-        self.mean = outcomes.mean(axis=0)
-        n, dim = outcomes.shape
-        try:
-            lower = self._factor(inputs, origin=np.zeros(inputs.shape[1]))
-        except np.linalg.LinAlgError:  # inputs far from 0, where rounding of squares hides small differences
-            lower = self._factor(inputs, origin=inputs.mean(axis=0))
-        root = solve_triangular(lower, np.eye(n), lower=True)
-        self._root = root.T  # root of the inverse covariance: root times transpose is the inverse
-        self._weights = self._root @ (root @ (outcomes - self.mean))  # (n, outcome_dim)
-        self._precisions = (root * root).sum(axis=0)
-        self.variance = max(float(((outcomes - self.mean) * self._weights).sum()) / (n * dim), _TINY)
-
-    def _factor(self, inputs: Array, origin: Array) -> Array:
-        """Cholesky factor ``(n, n)`` of the covariance of the inputs; from now on inputs are measured from
-        ``origin``."""
-        self._origin, self._inputs = origin, inputs - origin
-        covariance = self.kernel(squared_distances(self._inputs, self._inputs))
-        return np.asarray(np.linalg.cholesky(covariance + self.kernel.noise * np.eye(len(inputs))), dtype=np.float64)
-
-    def _covariances(self, inputs: Array) -> Array:
-        """Covariances ``(m, n)`` of new inputs ``(m, dim)`` with the inputs of the process."""
-        return self.kernel(squared_distances(inputs - self._origin, self._inputs))
-
-    def predict(self, inputs: Array) -> tuple[Array, Array]:
-        """Expected outcomes ``(m, outcome_dim)`` of new inputs ``(m, dim)``, and the variance ``(m,)`` of each
-        dimension, without noise."""
-        across = self._covariances(inputs)
-        known = across @ self._root
-        return across @ self._weights + self.mean, self.variance * np.maximum(1 - (known * known).sum(axis=1), 0)
-
-    def expect(self, inputs: Array) -> Array:
-        """Expected outcomes ``(m, outcome_dim)`` of new inputs ``(m, dim)``."""
-        expected: Array = self._covariances(inputs) @ self._weights + self.mean
-        return expected
-
-    def without_noise(self, rows: Rows) -> tuple[Array, Array]:
-        """Expected outcomes of the movements in ``rows`` without their noise, and their variances, as in `predict`."""
-        noise = self.kernel.noise
-        variances = self.variance * noise * np.maximum(1 - noise * self._precisions[rows], 0)
-        return self.outcomes[rows] - noise * self._weights[rows], variances
-
-    def surprise(self, rows: Rows) -> float:
-        """Mean squared error of predicting each of ``rows`` from all other rows, divided by the expected squared error;
-        1 if the variances of the process are right."""
-        squared = (self._weights[rows] ** 2).mean(axis=1)
-        return float((squared / self._precisions[rows]).mean()) / self.variance
-
-    def jacobians(self, points: Array) -> Array:
-        """Jacobians ``(m, outcome_dim, dim)`` of the expected outcomes at ``points`` ``(m, dim)``."""
-        differences = (points - self._origin)[:, None] - self._inputs  # (m, n, dim)
-        slopes = self.kernel.slope((differences * differences).sum(axis=2))
-        found: Array = self._weights.T @ (slopes[..., None] * differences)
-        return found
-
 
 def fit_lengths(inputs: Array, outcomes: Array) -> Array:
     """Most likely length scale ``(dim,)`` of each input, relative to its standard deviation.
@@ -148,16 +77,21 @@ def fit_lengths(inputs: Array, outcomes: Array) -> Array:
     def loss(parameters: Array) -> tuple[float, Array]:
         shrunk, noise = np.exp(-parameters[:dim]), float(np.exp(parameters[dim]))
         scaled = inputs * shrunk
-        distances = np.sqrt(squared_distances(scaled, scaled))
-        root = np.linalg.inv(np.linalg.cholesky(_matern(distances) + noise * np.eye(n)))
-        inverse = root.T @ root
-        weights = inverse @ deviations
+        distances = _ROOT5 * np.sqrt(squared_distances(scaled, scaled))
+        decay = np.exp(-distances)
+        covariance = (1 + distances * (1 + distances / 3)) * decay  # Matern 5/2
+        covariance.flat[:: n + 1] += noise
+        factor = cholesky(covariance, lower=True, overwrite_a=True, check_finite=False)
+        logs = np.log(np.diag(factor)).sum()
+        weights = cho_solve((factor, True), deviations, check_finite=False)
+        inverse, _ = dpotri(factor, lower=True, overwrite_c=True)  # its lower half
+        inverse = np.tril(inverse) + np.tril(inverse, -1).T
         variance = (deviations * weights).mean()
         by_covariance = 0.5 * (deviations.shape[1] * inverse - weights @ weights.T / variance)
-        by_square = -by_covariance * _matern_slope(distances)
+        by_square = by_covariance * (5 / 3 * (1 + distances) * decay)
         off = (parameters[:dim] - guess) / 1.5
         gradient = 2 * (by_square.sum(axis=1) @ squares - (inputs * (by_square @ inputs)).sum(axis=0)) * shrunk**2
-        likelihood = 0.5 * deviations.size * np.log(variance) - deviations.shape[1] * np.log(np.diag(root)).sum()
+        likelihood = 0.5 * deviations.size * np.log(variance) + deviations.shape[1] * logs
         value = float(likelihood + 0.5 * (off * off).sum())
         return value, np.append(gradient + off / 1.5, noise * np.trace(by_covariance))
 
@@ -176,21 +110,15 @@ def choose_kernel(groups: Sequence[tuple[Array, Array]], noise: float) -> Kernel
             twice or half as large, so other values are less likely, but possible. With 0 there is no noise.
     """
     noises = np.array(_NOISES if noise > 0 else [_LEAST])
-    scores: dict[tuple[float, float, float], Array] = {}
+    grid = np.array([(scale, *rough, 0.0) for scale, rough in itertools.product(_SCALES, _ROUGH)])
+    scores = np.zeros((len(grid), len(noises)))
     for inputs, outcomes in groups:
-        squared, deviations = squared_distances(inputs, inputs), outcomes - outcomes.mean(axis=0)
-        n, dim = outcomes.shape
-        for scale, (finer, share) in itertools.product(_SCALES, _ROUGH):
-            values, vectors = np.linalg.eigh(Kernel(scale, finer, share, 0.0)(squared))
-            spectrum = np.maximum(values, 0) + noises[:, None]  # (noises, n)
-            projected = ((vectors.T @ deviations) ** 2).sum(axis=1)
-            variances = np.maximum((projected / spectrum).sum(axis=1) / (n * dim), _TINY)
-            score = -0.5 * dim * (n * np.log(variances) + np.log(spectrum).sum(axis=1))
-            if noise > 0:
-                score -= 2 * dim * np.log(noises * variances / noise**2) ** 2 * n / 60
-            scores[scale, finer, share] = scores.get((scale, finer, share), np.zeros(len(noises))) + score
-    best = max(scores, key=lambda each: scores[each].max())
-    return Kernel(*best, noise=float(noises[scores[best].argmax()]))
+        deviations = np.ascontiguousarray((outcomes - outcomes.mean(axis=0)).T)
+        inputs = np.ascontiguousarray(inputs.T)
+        scores += compiled("sgimd_torch.inverses.kernels").scores(inputs, deviations, grid, noises, float(noise))
+    kernel, found = np.unravel_index(scores.argmax(), scores.shape)
+    scale, finer, share, _ = grid[kernel].tolist()
+    return Kernel(scale, finer, share, float(noises[found]))
 
 
 def squared_distances(one: Array, other: Array) -> Array:
@@ -202,8 +130,3 @@ def squared_distances(one: Array, other: Array) -> Array:
 def _matern(distances: Array) -> Array:
     """Matern 5/2 kernel."""
     return (1 + _ROOT5 * distances + 5 / 3 * distances**2) * np.exp(-_ROOT5 * distances)
-
-
-def _matern_slope(distances: Array) -> Array:
-    """Derivative of the Matern 5/2 kernel, divided by the distance."""
-    return -5 / 3 * (1 + _ROOT5 * distances) * np.exp(-_ROOT5 * distances)

@@ -62,7 +62,8 @@ class LocalInverse(Inverse):
 
     def _most_reliable(self, context: Array, goal: Array) -> Rows:
         near = near_goal(self.memory, context, goal, self.h_max)  # H of eq. (8)
-        neighbourhoods = self.memory.neighbourhoods(near, self.k_max, self.dist_n)  # K_h of eq. (8)
+        alike = self.memory.neighbourhoods(near, self.k_max, self.dist_n)
+        neighbourhoods = [rows[rows >= 0] for rows in alike]  # K_h of eq. (8)
         spreads = _spreads(self.memory.outcomes, neighbourhoods)
         unreliability = distances_to(self.memory.outcomes[near], goal) + self.alpha * spreads
         return neighbourhoods[int(unreliability.argmin())]

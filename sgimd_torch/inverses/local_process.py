@@ -13,10 +13,11 @@ from typing import Final
 
 import numpy as np
 
-from sgimd_torch.inverses.gaussian_process import Kernel, Process, choose_kernel, fit_lengths, one_thread
-from sgimd_torch.inverses.locally_linear import LocallyLinear
-from sgimd_torch.inverses.nearest import NearestNeighbour
-from sgimd_torch.memory.neighbours import PolicyNeighbours, Rows, Table
+from sgimd_torch.inverses.gaussian_process import Kernel, choose_kernel, fit_lengths, one_thread
+from sgimd_torch.inverses.locally_linear import NEAR, LocallyLinear
+from sgimd_torch.inverses.nearest import near_goal
+from sgimd_torch.memory.compiled import compiled
+from sgimd_torch.memory.neighbours import PolicyNeighbours, Table
 from sgimd_torch.parts import Inverse, Problem
 from sgimd_torch.spaces import Array, Estimate, stream
 
@@ -25,10 +26,7 @@ _FITTED: Final = 300  # number of exemplars, drawn from all, to which lengths ar
 _GROUPS, _GROUP = 8, 60  # number of groups of neighbours that determine the kernel, and of exemplars in each
 _NEAR: Final = 20  # exemplars with outcomes nearest to the goal, on which the surprise of the process is measured
 _LEARNT: Final = 100  # exemplars to which the process is fitted, the `_NEAR` ones among them
-_STARTS, _STEPS = 3, 4  # number of exemplars where steps begin, and of steps from each
-_DAMPINGS: Final = np.array([1e-3, 0.1, 1.0, 10.0])
 _FAR: Final = 1e3  # inputs more spreads from 0 are shifted to 0 first: rounding would hide their differences
-_CLEARLY: Final = 0.8  # error, relative to that of the nearest exemplar, below which a candidate is clearly better
 
 
 class LocalProcess(Inverse):
@@ -45,31 +43,37 @@ class LocalProcess(Inverse):
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)
         self.memory, self.noise = problem.memory, problem.outcome_noise
-        self._nearest, self._linear = NearestNeighbour(problem, k=_NEAR), LocallyLinear(problem)
+        self._linear = LocallyLinear(problem)
         self._fitted = 0  # exemplars at the last fit
         self._kernel: Kernel | None = None  # None while all outcomes are equal
 
-    @one_thread
     def __call__(self, context: Array, goal: Array) -> Estimate:
         """The answer, and the exemplars of the nearest outcomes, nearest first."""
-        estimate, learnt = self._nearest(context, goal), self._learn_near(context, goal)
-        if learnt is None:
-            return estimate
-        process, near, doubt = learnt
-        if self.memory.context_dim:
-            expected, variances = process.predict(self._in_lengths(context, self.memory.thetas[near]))
-        else:
-            expected, variances = process.without_noise(np.arange(len(near)))
-        exemplars = ((expected - goal) ** 2).sum(axis=1) + doubt * variances
-        best = int(exemplars.argmin())
-        linear = self._linear(context, goal).theta[None]
-        linear_error = self._expected_errors(process, context, goal, doubt, linear)
-        errors, found = self._descend(process, context, goal, doubt, estimate.thetas[:_STARTS])
-        errors = np.concatenate((exemplars[[best]], linear_error, errors))
-        candidates = np.concatenate((estimate.thetas[[best]], linear, found))
-        chosen_one = int(errors.argmin())
-        clearly = errors[chosen_one] < _CLEARLY * exemplars[0]
-        return estimate._replace(theta=candidates[chosen_one]) if clearly else estimate
+        memory = self.memory
+        context, goal = (np.ascontiguousarray(each, dtype=np.float64) for each in (context, goal))
+        self._catch_up()
+        near = near_goal(memory, context, goal, _NEAR)
+        thetas = memory.thetas[near]
+        if self._kernel is None:
+            return Estimate(thetas[0], thetas, memory.outcomes[near], context)
+        linear, _ = self._linear.correct(near[:NEAR], goal)
+        inputs, kernels = self._inputs.keys.rows, compiled("sgimd_torch.inverses.kernels")
+        alike = self._inputs.nearest(inputs[near[: kernels.STARTS]], _LEARNT)
+        theta = kernels.answer(
+            near,
+            alike,
+            inputs,
+            memory.thetas,
+            memory.outcomes,
+            context,
+            goal,
+            np.array(self._kernel),
+            linear,
+            self._units,
+            self._spreads,
+            memory.theta_range,
+        )
+        return Estimate(theta, thetas, memory.outcomes[near], context)
 
     def predict(self, context: Array, theta: Array) -> Array | None:
         """Expected outcome ``(outcome_dim,)`` of ``theta``, from similar movements. While all outcomes are equal, the
@@ -77,75 +81,15 @@ class LocalProcess(Inverse):
         found = self.predict_variance(context, theta)
         return None if found is None else found[0]
 
-    @one_thread
     def predict_variance(self, context: Array, theta: Array) -> tuple[Array, float] | None:
         """The result of `predict`, and the variance of each dimension, without noise."""
         self._catch_up()
         if self._kernel is None:
             return (self.memory.outcomes[-1], 0.0) if self._fitted else None
-        here = self._in_lengths(context, theta[None])
-        rows = self._inputs.nearest(here, min(_LEARNT, len(self.memory)))[0]
-        process = Process(self._inputs.keys.rows[rows], self.memory.outcomes[rows], self._kernel)
-        (expected,), (variance,) = process.predict(here)
-        return expected, float(variance)
-
-    def _learn_near(self, context: Array, goal: Array) -> tuple[Process, Rows, float] | None:
-        """The process of the movements near the goal, the rows of the nearest outcomes (its first rows), and the
-        factor that inflates the variance; None before the first fit."""
-        self._catch_up()
-        if self._kernel is None:
-            return None
-        near = self.memory.near_outcomes(context, goal, _NEAR)
-        rows = self._neighbours(near)
-        process = Process(self._inputs.keys.rows[rows], self.memory.outcomes[rows], self._kernel)
-        # Two corrections inflate the variance: one for surprising exemplars here, and one because a process with many
-        # lengths, fitted to few movements, errs most at the candidates that look best.
-        dim, n = len(self._lengths), len(self.memory)
-        return process, near, len(goal) * max(1.0, process.surprise(np.arange(len(near)))) * (1 + dim**2 / n)
-
-    def _descend(
-        self, process: Process, context: Array, goal: Array, doubt: float, starts: Array
-    ) -> tuple[Array, Array]:
-        """Least expected squared errors ``(m,)``, and their thetas, after damped Gauss-Newton steps from each of
-        ``starts`` ``(m, theta_dim)``; steps end when they do not help. Each step is as short as possible, so
-        unimportant parameters hardly change."""
-        least, found = np.full(len(starts), np.inf), starts.copy()
-        going = np.arange(len(starts))
-        dim, spreads, lengths = starts.shape[1], self._spreads[: starts.shape[1]], self._lengths[: starts.shape[1]]
-        for _ in range(_STEPS):
-            here = self._in_lengths(context, found[going])
-            ahead = goal - process.expect(here)
-            jacobians = process.jacobians(here)[:, :, :dim] / lengths  # (m, outcome_dim, theta_dim)
-            transposed = jacobians.transpose(0, 2, 1)
-            squares = jacobians @ transposed
-            sizes = np.trace(squares, axis1=1, axis2=2) / len(goal) + 1e-300
-            damped = squares[:, None] + (sizes[:, None] * _DAMPINGS)[..., None, None] * np.eye(len(goal))
-            steps = (transposed[:, None] @ np.linalg.solve(damped, ahead[:, None, :, None]))[..., 0]
-            tried = np.clip(found[going, None] + spreads * steps, *self.memory.theta_range)
-            errors = self._expected_errors(process, context, goal, doubt, tried.reshape(-1, dim))
-            errors = errors.reshape(tried.shape[:2])
-            best = errors.argmin(axis=1), errors.min(axis=1)
-            better = np.flatnonzero(best[1] < least[going])
-            going = going[better]
-            if not len(going):
-                break
-            least[going], found[going] = best[1][better], tried[better, best[0][better]]
-        return least, found
-
-    def _expected_errors(self, process: Process, context: Array, goal: Array, doubt: float, thetas: Array) -> Array:
-        """Expected squared errors ``(m,)`` of ``thetas`` ``(m, theta_dim)``, without noise."""
-        expected, variances = process.predict(self._in_lengths(context, thetas))
-        errors: Array = ((expected - goal) ** 2).sum(axis=1) + doubt * variances
-        return errors
-
-    def _neighbours(self, near: Rows) -> Rows:
-        """Rows to fit the process to: first the rows ``near`` the goal, then rows most similar to the first of them."""
-        keys = self._inputs.keys.rows[near[:_STARTS]]
-        alike = self._inputs.nearest(keys, min(_LEARNT, len(self.memory)))
-        rows = np.concatenate((near, np.stack(alike, axis=1).ravel()))
-        _, first = np.unique(rows, return_index=True)
-        found: Rows = rows[np.sort(first)[:_LEARNT]]
-        return found
+        here = (np.concatenate((theta, context)) - self._units[0]) / self._units[1]
+        (rows,) = self._inputs.nearest(here[None], _LEARNT)
+        kernels = compiled("sgimd_torch.inverses.kernels")
+        return kernels.foretell(self._inputs.keys.rows, self.memory.outcomes, rows, here, np.array(self._kernel))
 
     def _catch_up(self) -> None:
         """Add new exemplars; refit when the memory has grown by half."""
@@ -158,6 +102,7 @@ class LocalProcess(Inverse):
         if self._kernel is not None and len(self._inputs.keys) < n:
             self._inputs.keys.append(self._scaled(len(self._inputs.keys)))
 
+    @one_thread
     def _fit(self, n: int) -> None:
         """Fit lengths and kernel to the first ``n`` exemplars; later exemplars do not count."""
         try:
@@ -169,30 +114,26 @@ class LocalProcess(Inverse):
         self._fitted, self._kernel = n, None
         raw = np.concatenate((self.memory.thetas[:n], self.memory.contexts[:n]), axis=1)
         outcomes = self.memory.outcomes[:n]
-        self._origin = np.where(np.abs(raw[0]) > far * _spreads(raw), raw[0], 0.0)
-        raw = raw - self._origin
-        self._spreads = _spreads(raw)
+        origin = np.where(np.abs(raw[0]) > far * _spreads(raw), raw[0], 0.0)
+        self._spreads = _spreads(raw - origin)
         if not np.ptp(outcomes, axis=0).any():
             return
         order = stream(n, "fit of a local process").permutation(n)
-        self._lengths = fit_lengths(raw[order[:_FITTED]] / self._spreads, outcomes[order[:_FITTED]])
+        drawn = order[:_FITTED]
+        lengths = fit_lengths((raw[drawn] - origin) / self._spreads, outcomes[drawn])
+        self._units = np.stack((origin, self._spreads * lengths))
         self._inputs = PolicyNeighbours(Table(raw.shape[1]))
         self._inputs.keys.append(self._scaled(0)[:n])
-        centres = self._inputs.keys.rows[order[:_GROUPS]]
-        groups = self._inputs.nearest(centres, min(_GROUP, n))
+        inputs = self._inputs.keys.rows
+        groups = self._inputs.nearest(inputs[order[:_GROUPS]], _GROUP)
         varied = [rows for rows in groups if np.ptp(outcomes[rows], axis=0).any()]
         if varied:
-            inputs = self._inputs.keys.rows
             self._kernel = choose_kernel([(inputs[rows], outcomes[rows]) for rows in varied], self.noise)
 
     def _scaled(self, first: int) -> Array:
         """Inputs from row ``first`` on, in lengths."""
         raw = np.concatenate((self.memory.thetas[first:], self.memory.contexts[first:]), axis=1)
-        return (raw - self._origin) / self._spreads / self._lengths
-
-    def _in_lengths(self, context: Array, thetas: Array) -> Array:
-        inputs = np.concatenate((thetas, np.tile(context, (len(thetas), 1))), axis=1)
-        scaled: Array = (inputs - self._origin) / self._spreads / self._lengths
+        scaled: Array = (raw - self._units[0]) / self._units[1]
         return scaled
 
 

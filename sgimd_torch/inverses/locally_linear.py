@@ -6,18 +6,18 @@ Deviation: the paper stops at the weighted mean of eq. (9); this model corrects 
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
-from sgimd_torch.inverses.local import LocalInverse, gaussian_weights
+from sgimd_torch.inverses.nearest import near_goal
+from sgimd_torch.memory import Rows
+from sgimd_torch.memory.compiled import compiled
 from sgimd_torch.parts import Inverse, Problem
 from sgimd_torch.spaces import Array, Estimate
 
-# A slope needs more exemplars in a neighbourhood, and a wider Gaussian, than the mean of `LocalInverse`.
-_K_MAX, _WIDTH = 20, 1.0
-# Ridge, relative to the variance of the outcomes; with a larger ridge the answer is nearer to `LocalInverse`. The ridge
-# also makes the regression unique when outcomes lie on a line, or are fewer than the slopes.
-_RIDGE = 1e-3
-_COINCIDENT = 1e-12  # least spread of outcomes relative to their size; below it, they count as one, without a slope
+NEAR: Final = 10  # number of nearest outcomes that are compared, eq. (8)
+_ALIKE: Final = 20  # largest number of exemplars in a neighbourhood; a slope needs more than the mean of `LocalInverse`
 
 
 class LocallyLinear(Inverse):
@@ -34,7 +34,7 @@ class LocallyLinear(Inverse):
 
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)
-        self._local = LocalInverse(problem, k_max=_K_MAX, width=_WIDTH)
+        self._memory, self._radius = problem.memory, 0.6 * np.sqrt(problem.policies.dim / 25)  # as `LocalInverse`
 
     def __call__(self, context: Array, goal: Array) -> Estimate:
         """The corrected theta_g, with K_best as :class:`LocalInverse` gives it.
@@ -42,16 +42,14 @@ class LocallyLinear(Inverse):
         Raises:
             RuntimeError: the memory is empty.
         """
-        estimate = self._local(context, goal)
-        mean_theta, thetas, outcomes, _ = estimate
-        weights = gaussian_weights(goal, outcomes, _WIDTH)
-        mean_outcome = weights @ outcomes
-        deviations = outcomes - mean_outcome
-        covariance = (weights * deviations.T) @ deviations
-        variance = covariance.trace()
-        if variance <= (_COINCIDENT * np.abs(outcomes).max()) ** 2:
-            return estimate
-        cross = (weights * deviations.T) @ (thetas - mean_theta)
-        slope = np.linalg.solve(covariance + _RIDGE * variance * np.eye(len(goal)), cross)
-        theta = mean_theta + (goal - mean_outcome) @ slope
-        return estimate._replace(theta=np.clip(theta, *self.problem.memory.theta_range))
+        memory, goal = self._memory, np.ascontiguousarray(goal, dtype=np.float64)
+        theta, rows = self.correct(near_goal(memory, context, goal, NEAR), goal)
+        return Estimate(theta, memory.thetas[rows], memory.outcomes[rows], context)
+
+    def correct(self, near: Rows, goal: Array) -> tuple[Array, Rows]:
+        """The corrected theta_g and the rows of K_best, from the rows ``near`` of the outcomes nearest to the goal."""
+        memory = self._memory
+        alike = memory.neighbourhoods(near, _ALIKE, self._radius)
+        kernels = compiled("sgimd_torch.inverses.kernels")
+        best, theta = kernels.locally_linear(alike, memory.thetas, memory.outcomes, goal, memory.theta_range)
+        return theta, alike[best][alike[best] >= 0]

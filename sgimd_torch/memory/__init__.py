@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.memory.neighbours import PolicyNeighbours, Rows, Table, TreeNeighbours, squared_distances
+from sgimd_torch.memory.neighbours import Found, PolicyNeighbours, Rows, Table, TreeNeighbours
 from sgimd_torch.spaces import Array, check_point
 
 __all__ = ["Memory", "Nearest", "Rows"]
@@ -44,7 +44,7 @@ class Memory:
         # A key is a context followed by an outcome or by a theta; without contexts, outcomes and thetas are the keys.
         self._outcome_side = TreeNeighbours(Table(context_dim + outcome_dim) if context_dim else self._outcomes)
         self._policy_side = PolicyNeighbours(Table(context_dim + theta_dim) if context_dim else self._thetas)
-        self._range, self._ranged = (np.full(theta_dim, np.inf), np.full(theta_dim, -np.inf)), 0
+        self._range, self._ranged = np.stack((np.full(theta_dim, np.inf), np.full(theta_dim, -np.inf))), 0
 
     def __len__(self) -> int:
         return len(self._thetas)
@@ -65,12 +65,12 @@ class Memory:
         return self._outcomes.rows
 
     @property
-    def theta_range(self) -> tuple[Array, Array]:
-        """Least and greatest value of each parameter so far, ``(theta_dim,)`` each; infinite for an empty memory."""
+    def theta_range(self) -> Array:
+        """``(2, theta_dim)``, least and greatest value of each parameter so far; infinite for an empty memory."""
         new, self._ranged = self.thetas[self._ranged :], len(self)
         if len(new):
             lowest, highest = self._range
-            self._range = np.minimum(lowest, new.min(axis=0)), np.maximum(highest, new.max(axis=0))
+            self._range = np.stack((np.minimum(lowest, new.min(axis=0)), np.maximum(highest, new.max(axis=0))))
         return self._range
 
     def add(self, context: ArrayLike, theta: ArrayLike, outcome: ArrayLike) -> None:
@@ -112,11 +112,13 @@ class Memory:
         With more than ``EXACT_UP_TO`` exemplars in memory some of these rows may be missing, see `PolicyNeighbours`.
         """
         theta = check_point("theta", theta, self.theta_dim, "was a goal passed instead?")
-        return self._policy_side.nearest(self._key(context, theta)[None], k, within)[0]
+        (found,) = self._policy_side.nearest(self._key(context, theta)[None], k, within)
+        return found[found >= 0]
 
-    def neighbourhoods(self, rows: Rows, k: int, within: float = np.inf) -> list[Rows]:
-        """Result of :meth:`near_policies` for the context and theta of each of ``rows``; a row is its own neighbour."""
-        return self._policy_side.nearest(self._policy_side.keys.rows[rows], k, within)
+    def neighbourhoods(self, rows: Rows, k: int, within: float = np.inf) -> Rows:
+        """Result of :meth:`near_policies` for the context and theta of each of ``rows``, ``(len(rows), min(k, n))``,
+        with -1 where there are fewer; a row is its own neighbour."""
+        return self._policy_side.around(rows, k, within)
 
     def copy_for(self, dims: tuple[int, int, int]) -> Memory:
         """A copy for a learner with these dimensions.
@@ -151,18 +153,14 @@ class Nearest:
     """The row whose outcome lies nearest to one goal in one context; later looks compare only newer exemplars."""
 
     def __init__(self, side: TreeNeighbours, key: Array) -> None:
-        self._side, self._key = side, key
-        self._row: int | None = None
-        self._squared, self._seen = np.inf, 0
+        self._side, self._key, self._seen = side, key, 0
+        self._found = Found(key[None], 1)
 
     @property
     def row(self) -> int | None:
         """The nearest row, the oldest of equally near ones; None for an empty memory."""
         seen, self._seen = self._seen, len(self._side.keys)
         if seen < self._seen:
-            rows = self._side.keys.rows
-            first = seen if seen else int(self._side.nearest(self._key, 1)[0])
-            squared = squared_distances(rows[first : None if seen else first + 1], self._key)
-            if (nearest := squared.min()) < self._squared:
-                self._row, self._squared = first + int(squared.argmin()), nearest
-        return self._row
+            self._found.extend(self._side.keys.rows, seen if seen else int(self._side.nearest(self._key, 1)[0]))
+        found = int(self._found.rows[0, 0])
+        return None if found < 0 else found

@@ -1,7 +1,7 @@
-"""Nearest rows of a growing table: by a tree, by comparing all rows, or, for very many rows, by cells.
+"""Nearest rows of a growing table: by comparing all rows, or, for very many rows, by a tree or by cells.
 
 The memory uses it to find outcomes near a goal (section 4.4.2 of Nguyen & Oudeyer, 2014: H of eq. 8) and movements
-like a given one (K_h). scipy or faiss proposes rows, and float64 distances decide; equally near rows keep their order.
+like a given one (K_h). If scipy or faiss proposes rows, float64 distances decide; equally near rows keep their order.
     side = TreeNeighbours(Table(2)); side.keys.append(keys); rows = side.nearest(query, k=10)
 Results depend on the rows alone, not on earlier queries. A query first adds new rows to the tree or the index.
 """
@@ -9,6 +9,8 @@ Results depend on the rows alone, not on earlier queries. A query first adds new
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from threading import Lock
 from typing import Final
 
 import faiss
@@ -16,18 +18,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from sgimd_torch.memory.compiled import compiled
 from sgimd_torch.spaces import Array
 
 Rows = NDArray[np.int64]
 
 EXACT_UP_TO: Final = 2**15  # largest number of rows for which `PolicyNeighbours` is exact; for more it is approximate
+LISTED: Final = 20  # number of neighbours of a row that are kept
 _SPARE: Final = 8  # number of proposals beyond k, so that the last is nearly always clearly farther than the k-th
-_EPSILON32: Final = float(np.finfo(np.float32).eps)
-_LARGEST32: Final = float(np.finfo(np.float32).max)  # distance that faiss reports where float32 overflows
+_LARGEST32: Final = float(np.finfo(np.float32).max)
 _ROUNDING: Final = 1e-9  # relative error far above the rounding of float64 distances
 
 faiss.omp_set_num_threads(1)  # queries last microseconds, and waking threads costs more than it saves
-# Above this threshold faiss computes |a|^2 + |b|^2 - 2ab, whose cancellation would break `_surely_proposed`.
+# With more queries at once than this, faiss would round distances otherwise than for one query.
 faiss.cvar.distance_compute_blas_threshold = 2**20
 
 
@@ -69,7 +72,7 @@ class Table:
 class TreeNeighbours:
     """Exact neighbours in few dimensions: a tree of all rows but the newest, which are compared one by one."""
 
-    _NEWEST: Final = 1024  # most rows outside the tree, or a thirty-second of the tree if that is more
+    _NEWEST: Final = 2**13  # most rows outside the tree, or a thirty-second of the tree if that is more
 
     def __init__(self, keys: Table) -> None:
         self.keys = keys
@@ -87,18 +90,17 @@ class TreeNeighbours:
         if n - self._n_in_tree > max(self._NEWEST, self._n_in_tree // 32):
             # The two options do not change results; while they are off, the tree is built twice as fast.
             self._tree, self._n_in_tree = cKDTree(keys, balanced_tree=False, compact_nodes=False), n
-        newest = np.arange(self._n_in_tree, n)
         if self._tree is None:
-            return _nearest_of(keys, query, newest, k)[0]
+            return Found(query[None], min(k, n)).extend(keys).rows[0]
         n_proposed = min(k + _SPARE, self._tree.n)
         distances, proposed = self._tree.query(query, n_proposed)
         beyond = distances[-1] if n_proposed < self._tree.n else np.inf  # least distance of the other rows of the tree
-        rows, squared = _nearest_of(keys, query, np.concatenate((np.sort(proposed), newest)), k)
-        reach = math.sqrt(squared[-1]) * (1 + _ROUNDING)
-        if reach < beyond:
-            return rows
-        ball = self._tree.query_ball_point(query, reach, return_sorted=True)
-        return _nearest_of(keys, query, np.concatenate((np.array(ball, dtype=np.int64), newest)), k)[0]
+        found = _among(keys, query, min(k, n), np.sort(proposed)).extend(keys, self._n_in_tree)
+        reach = math.sqrt(found.squared[0, -1]) * (1 + _ROUNDING)
+        if reach >= beyond:
+            ball = self._tree.query_ball_point(query, reach, return_sorted=True)
+            found = _among(keys, query, min(k, n), np.array(ball, dtype=np.int64)).extend(keys, self._n_in_tree)
+        return found.rows[0]
 
 
 class PolicyNeighbours:
@@ -109,34 +111,91 @@ class PolicyNeighbours:
 
     def __init__(self, keys: Table) -> None:
         self.keys = keys
-        self._index: faiss.Index = faiss.IndexFlatL2(keys.dim)
-        self._exact = True
+        self._cells: faiss.Index | None = None
+        # Neighbours of each row, found among its first ``_seen`` rows.
+        self._lists, self._seen, self._extending = Found(keys.rows[:0], LISTED), np.empty(0, np.int64), Lock()
 
-    def nearest(self, queries: Array, k: int, within: float = np.inf) -> list[Rows]:
-        """For each of ``queries`` ``(m, dim)`` at most ``k`` rows not farther than ``within``, nearest first.
+    def nearest(self, queries: Array, k: int, within: float = np.inf) -> Rows:
+        """For each of ``queries`` ``(m, dim)`` the ``(min(k, n),)`` nearest rows, nearest first; -1 instead of rows
+        farther than ``within``.
 
         Raises:
             ValueError: ``k`` is below 1.
         """
         _check_k(k)
         keys = self.keys.rows
-        if len(keys) <= k + _SPARE:
-            return [_rank(keys, query, k, within) for query in queries]
-        if self._exact and len(keys) > EXACT_UP_TO:
-            self._index, self._exact = _in_cells(_float32(keys[:EXACT_UP_TO])), False
-        if self._index.ntotal < len(keys):
-            self._index.add(_float32(keys[self._index.ntotal :]))
-        squared32, proposed = self._index.search(_float32(queries), k + _SPARE)
-        found: list[Rows] = []
-        for query, rows, squared, beyond in zip(
-            queries, *_decide(keys, queries, proposed, k), squared32[:, -1].astype(np.float64), strict=True
-        ):
-            if self._exact:
-                enough = _surely_proposed(query, min(math.sqrt(squared[-1]), within), beyond)
+        if len(keys) <= EXACT_UP_TO:
+            return Found(queries, min(k, len(keys))).extend(keys).within(within)
+        return np.concatenate([found.within(within) for found in self._from_cells(queries, k)])
+
+    def around(self, rows: Rows, k: int, within: float = np.inf) -> Rows:
+        """Result of `nearest` for each of ``rows``; neighbours that are known from earlier calls are not sought again.
+
+        Raises:
+            ValueError: ``k`` is below 1.
+        """
+        keys, n = self.keys.rows, len(self.keys)
+        if k > LISTED or n > EXACT_UP_TO:
+            return self.nearest(keys[rows], k, within)
+        _check_k(k)
+        with self._extending:
+            lists = self._lists
+            if n > len(self._seen):
+                more = Found(keys, LISTED)
+                self._seen = np.concatenate((self._seen, np.zeros(n, np.int64)))
+                lists.rows = np.concatenate((lists.rows, more.rows))
+                lists.squared = np.concatenate((lists.squared, more.squared))
+            found = Found(keys[rows], LISTED)
+            found.rows, found.squared = lists.rows[rows], lists.squared[rows]
+            found.extend(keys, self._seen[rows])
+            lists.rows[rows], lists.squared[rows], self._seen[rows] = found.rows, found.squared, n
+        return np.ascontiguousarray(found.within(within)[:, : min(k, n)])
+
+    def _from_cells(self, queries: Array, k: int) -> Iterator[Found]:
+        """The rows nearest to each query in the cells nearest to it."""
+        keys = self.keys.rows
+        if self._cells is None:
+            self._cells = _in_cells(_float32(keys[:EXACT_UP_TO]))
+        if self._cells.ntotal < len(keys):
+            self._cells.add(_float32(keys[self._cells.ntotal :]))
+        _, proposed = self._cells.search(_float32(queries), k + _SPARE)
+        for query, rows in zip(queries, np.sort(proposed, axis=1), strict=True):
+            rows = rows[rows >= 0]
+            if len(rows) < k:  # the cells are nearly empty, or the query overflows float32
+                yield Found(query[None], k).extend(keys)
             else:
-                enough = squared[-1] < np.inf  # False if cells are nearly empty, or the query overflows float32
-            found.append(rows[squared <= within * within] if enough else _rank(keys, query, k, within))
-        return found
+                yield _among(keys, query, k, rows)
+
+
+class Found:
+    """Rows nearest to some queries ``(m, dim)`` among the rows seen so far, nearest first.
+
+    Attributes:
+        rows: ``(m, k)``; -1 while fewer than k rows were seen.
+        squared: ``(m, k)``, their squared distances; infinite while fewer than k rows were seen.
+    """
+
+    def __init__(self, queries: Array, k: int) -> None:
+        self._queries = queries
+        self.rows, self.squared = np.full((len(queries), k), -1), np.full((len(queries), k), np.inf)
+
+    def extend(self, keys: Array, first: int | Rows = 0) -> Found:
+        """Add the rows of ``keys`` ``(n, dim)`` from row ``first`` on, a number for all queries or for each."""
+        begin = np.full(len(self.rows), first)
+        compiled("sgimd_torch.memory.scan").scan(keys, begin, self._queries, self.rows, self.squared)
+        return self
+
+    def within(self, radius: float) -> Rows:
+        """``rows``, with -1 instead of those farther than ``radius``."""
+        return self.rows if radius == np.inf else np.where(self.squared <= radius * radius, self.rows, -1)
+
+
+def _among(keys: Array, query: Array, k: int, proposed: Rows) -> Found:
+    """The rows nearest to a query among the increasing rows ``proposed``."""
+    found = Found(query[None], k).extend(keys[proposed])
+    n = min(k, len(proposed))
+    found.rows[0, :n] = proposed[found.rows[0, :n]]
+    return found
 
 
 def _in_cells(rows32: NDArray[np.float32]) -> faiss.IndexIVFFlat:
@@ -164,45 +223,3 @@ def _float32(array: Array) -> NDArray[np.float32]:
     """
     large = np.abs(array) > _LARGEST32
     return np.where(large, np.copysign(np.inf, array), array).astype(np.float32)
-
-
-def _surely_proposed(query: Array, reach: float, beyond: float) -> bool:
-    """Whether all rows within ``reach`` of ``query`` were proposed, if all other rows have a squared float32 distance
-    of at least ``beyond``.
-
-    Rounding a key, the query, their difference and the sum to float32 changes a distance of ``reach`` by at most
-    ``error``.
-    """
-    error = _EPSILON32 * (len(query) + 5) * (reach + math.sqrt((query * query).sum()))
-    return (reach + error) ** 2 < beyond < _LARGEST32
-
-
-def _decide(keys: Array, queries: Array, proposed: Rows, k: int) -> tuple[Rows, Array]:
-    """The ``k`` nearest of the rows ``proposed`` ``(m, n)`` for each query, nearest first, and their squared distances;
-    the distance is infinite for row -1."""
-    proposed.sort(axis=1)  # the stable sort below then leaves ties in order of row number
-    squared = squared_distances(keys[proposed], queries[:, None])
-    squared[proposed < 0] = np.inf
-    order = squared.argsort(axis=1, kind="stable")[:, :k]
-    return np.take_along_axis(proposed, order, axis=1), np.take_along_axis(squared, order, axis=1)
-
-
-def _rank(keys: Array, query: Array, k: int, within: float) -> Rows:
-    rows, squared = _nearest_of(keys, query, np.arange(len(keys)), k)
-    return rows[squared <= within * within]
-
-
-def _nearest_of(keys: Array, query: Array, rows: Rows, k: int) -> tuple[Rows, Array]:
-    """The ``k`` nearest of the increasing ``rows``, and their squared distances."""
-    squared = squared_distances(keys[rows], query)
-    if k < len(rows):
-        near = squared <= np.partition(squared, k - 1)[k - 1]  # equal distances included; the sort keeps older rows
-        rows, squared = rows[near], squared[near]
-    order = squared.argsort(kind="stable")[:k]
-    return rows[order], squared[order]
-
-
-def squared_distances(points: Array, query: Array) -> Array:
-    """Squared distances ``(...)`` between ``points`` and ``query``, ``(..., dim)`` each."""
-    difference = points - query
-    return (difference * difference).sum(axis=-1)

@@ -1,5 +1,8 @@
 """Eqs. (8) and (9): memories small enough to work the inverse out by hand, and laws every inverse model keeps."""
 
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -175,6 +178,23 @@ def test_asking_twice_answers_the_same_inside_the_policy_space(make, far: float)
     for theta, outcome in zip(first.thetas, first.outcomes, strict=True):
         row = int((memory.thetas == theta).all(axis=1).argmax())
         assert np.array_equal(memory.outcomes[row], outcome)
+
+
+def test_answers_in_threads_are_those_one_by_one(make) -> None:
+    given, goals = random_movements(300), stream(0, "goals").uniform(-1, 1, (200, 2))
+    one_by_one = [estimate.theta for estimate in make(given).answer_many(np.zeros((200, 0)), goals)]
+    inverse = make(random_movements(300))
+    inverse(NO_CONTEXT, goals[0])  # fits
+    with ThreadPoolExecutor(4) as pool:
+        found = [estimate.theta for estimate in pool.map(partial(inverse, NO_CONTEXT), goals)]
+    assert np.array_equal(found, one_by_one)
+
+
+def test_a_goal_may_be_a_list_or_a_view(make) -> None:
+    inverse, goal = make(random_movements(50)), np.array([0.2, -0.1])
+    theta = inverse(NO_CONTEXT, goal).theta
+    for same in (goal.tolist(), np.array([0.2, 9.0, -0.1])[::2]):
+        assert np.array_equal(inverse([], same).theta, theta)
 
 
 def test_a_mean_of_movements_on_the_border_does_not_leave_the_policy_space_by_rounding() -> None:

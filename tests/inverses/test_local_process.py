@@ -5,7 +5,8 @@ import pytest
 from threadpoolctl import threadpool_info
 
 from sgimd_torch.environments.toys import Toy, toss, two_elbows
-from sgimd_torch.inverses.gaussian_process import Kernel, Process, choose_kernel, fit_lengths, one_thread
+from sgimd_torch.inverses import kernels
+from sgimd_torch.inverses.gaussian_process import Kernel, choose_kernel, fit_lengths, one_thread
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.inverses.locally_linear import LocallyLinear
 from sgimd_torch.inverses.nearest import NearestNeighbour
@@ -34,44 +35,72 @@ def waves(n: int = 30) -> tuple[Array, Array]:
     return inputs, np.stack([np.sin(inputs.sum(axis=1)), np.cos(inputs[:, 0])], axis=1)
 
 
+def fitted(inputs: Array, outcomes: Array, kernel: Kernel) -> kernels.Process:
+    return kernels.fitted(np.ascontiguousarray(inputs.T), np.ascontiguousarray(outcomes.T), np.array(kernel))
+
+
+def predicted(inputs: Array, outcomes: Array, kernel: Kernel, point: Array) -> tuple[Array, float]:
+    return kernels.foretell(inputs, outcomes, np.arange(len(inputs)), point, np.array(kernel))
+
+
 def test_without_noise_it_knows_what_it_was_given_and_far_away_only_the_mean() -> None:
     inputs, outcomes = waves()
-    process = Process(inputs, outcomes, SMOOTH)
-    expected, variances = process.predict(inputs)
-    assert expected == pytest.approx(outcomes, abs=1e-3)
-    assert variances == pytest.approx(0, abs=1e-4 * process.variance)
-    expected, variances = process.predict(np.full((1, 2), 1e3))
-    assert expected[0] == pytest.approx(outcomes.mean(axis=0))
-    assert variances[0] == pytest.approx(process.variance)
+    variance = fitted(inputs, outcomes, SMOOTH).variance
+    for point, outcome in zip(inputs, outcomes, strict=True):
+        expected, doubt = predicted(inputs, outcomes, SMOOTH, point)
+        assert expected == pytest.approx(outcome, abs=1e-3)
+        assert doubt == pytest.approx(0, abs=1e-4 * variance)
+    expected, doubt = predicted(inputs, outcomes, SMOOTH, np.full(2, 1e3))
+    assert expected == pytest.approx(outcomes.mean(axis=0))
+    assert doubt == pytest.approx(variance)
 
 
 @pytest.mark.parametrize("kernel", [SMOOTH, ROUGH])
-def test_its_jacobian_is_the_slope_of_what_it_predicts(kernel: Kernel) -> None:
-    process = Process(*waves(), kernel)
-    point, step = np.array([1.3, 0.9]), 1e-5
-    ahead, back = (process.predict(point + sign * step * np.eye(2))[0] for sign in (1, -1))
-    assert process.jacobians(point[None])[0] == pytest.approx(((ahead - back) / (2 * step)).T, rel=1e-4, abs=1e-5)
+def test_the_compiled_kernel_is_that_of_the_class_and_its_slope_the_derivative(kernel: Kernel) -> None:
+    inputs, step = waves()[0], 1e-6
+    point, covariance, slope = np.array([1.3, 0.9]), np.empty(30), np.empty(30)
+
+    def at(place: Array) -> Array:
+        kernels.covariances(np.ascontiguousarray(inputs.T), np.array(kernel), place, covariance, slope)
+        return covariance.copy()
+
+    assert at(point) == pytest.approx(kernel(((inputs - point) ** 2).sum(axis=1)))
+    by_input = slope[:, None] * (point - inputs)
+    for k, along in enumerate(step * np.eye(2)):
+        assert by_input[:, k] == pytest.approx((at(point + along) - at(point - along)) / (2 * step), abs=1e-8)
 
 
-def test_a_remembered_outcome_without_its_noise_is_what_the_process_predicts_there() -> None:
+@pytest.mark.parametrize("kernel", [SMOOTH, ROUGH])
+def test_steps_reach_the_goal_where_the_process_can_reach_it(kernel: Kernel) -> None:
     inputs, outcomes = waves()
-    process, rows = Process(inputs, outcomes, ROUGH), np.array([3, 7])
-    for mine, predicted in zip(process.without_noise(rows), process.predict(inputs[rows]), strict=True):
-        assert mine == pytest.approx(predicted)
+    process, point, goal = fitted(inputs, outcomes, kernel), np.array([1.3, 0.9]), np.array([0.5, -0.4])
+    units, box = np.stack((np.zeros(2), np.ones(2))), np.stack((np.zeros(2), np.full(2, 3.0)))
+    _, theta = kernels.descend(process, point, np.zeros(0), goal, 1e-9, units, np.ones(2), box)
+    missed, reached = (np.linalg.norm(predicted(inputs, outcomes, kernel, at)[0] - goal) for at in (point, theta))
+    assert reached < 0.1 * missed
 
 
-def test_surprise_is_the_error_of_predicting_each_from_all_others() -> None:
+def test_an_outcome_without_its_noise_is_what_the_process_predicts_there() -> None:
+    inputs, outcomes = waves()
+    process = fitted(inputs, outcomes, ROUGH)
+    precision = kernels.precisions(process.factor, 5)
+    for row in range(25, 30):
+        expected, doubt = predicted(inputs, outcomes, ROUGH, inputs[row])
+        assert outcomes[row] - ROUGH.noise * process.weights[:, row] == pytest.approx(expected)
+        assert process.variance * ROUGH.noise * (1 - ROUGH.noise * precision[row - 25]) == pytest.approx(doubt)
+
+
+def test_weights_and_precisions_give_the_error_of_predicting_each_from_all_others() -> None:
     inputs, outcomes = waves()
     outcomes -= outcomes.mean(axis=0)
-    process, rows = Process(inputs, outcomes, ROUGH), np.array([3, 7])
-    squared = []
-    for row in rows:
-        others = np.delete(np.arange(len(inputs)), row)
-        covariance = ROUGH(((inputs[:, None] - inputs) ** 2).sum(axis=2)) + ROUGH.noise * np.eye(len(inputs))
+    process = fitted(inputs, outcomes, ROUGH)
+    precision = kernels.precisions(process.factor, 5)
+    for row in range(25, 30):
+        others = np.delete(np.arange(30), row)
+        covariance = ROUGH(((inputs[:, None] - inputs) ** 2).sum(axis=2)) + ROUGH.noise * np.eye(30)
         gains = np.linalg.solve(covariance[np.ix_(others, others)], covariance[others, row])
-        variance = process.variance * (covariance[row, row] - gains @ covariance[others, row])
-        squared.append(((outcomes[row] - gains @ outcomes[others]) ** 2).mean() / variance)
-    assert process.surprise(rows) == pytest.approx(np.mean(squared))
+        assert process.weights[:, row] / precision[row - 25] == pytest.approx(outcomes[row] - gains @ outcomes[others])
+        assert 1 / precision[row - 25] == pytest.approx(covariance[row, row] - gains @ covariance[others, row])
 
 
 def test_the_length_of_an_input_that_matters_is_the_shortest() -> None:
@@ -87,7 +116,7 @@ def test_the_kernel_takes_about_as_much_for_noise_as_is_stated(noise: float) -> 
     inputs = rng.uniform(0, 3, (60, 2))
     outcomes = np.sin(inputs.sum(axis=1, keepdims=True)) + rng.normal(0, noise, (60, 1))
     kernel = choose_kernel([(inputs, outcomes)], noise)
-    assert noise / 3 < np.sqrt(kernel.noise * Process(inputs, outcomes, kernel).variance) < 3 * noise
+    assert noise / 3 < np.sqrt(kernel.noise * fitted(inputs, outcomes, kernel).variance) < 3 * noise
     assert choose_kernel([(inputs, outcomes)], 0.0).noise == 1e-6
 
 

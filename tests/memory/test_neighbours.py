@@ -30,25 +30,33 @@ def structured(n: int, dim: int, seed: int = 0) -> Array:
 @pytest.mark.parametrize("dim", [1, 2, 3, 9])
 def test_a_tree_gives_what_brute_force_gives_while_the_table_grows(dim: int) -> None:
     rng = stream(dim, "test")
-    rows = rng.normal(size=(9000, dim))
+    rows = rng.normal(size=(20_000, dim))
     side = TreeNeighbours(Table(dim))
-    for start, stop in ((0, 5), (5, 1000), (1000, 1500), (1500, 1501), (1501, 4000), (4000, 4100), (4100, 9000)):
+    for start, stop in (
+        (0, 5),
+        (5, 8192),
+        (8192, 8193),
+        (8193, 9000),
+        (9000, 17_000),
+        (17_000, 17_100),
+        (17_100, 20_000),
+    ):
         side.keys.append(rows[start:stop])
         for query in (*rng.normal(size=(5, dim)), rows[start], 1e6 * rng.normal(size=dim)):
             for k in (1, 10, 40):
                 assert side.nearest(query, k).tolist() == nearest(rows[:stop], query, k)
-    assert sorted(side.nearest(rows[0], 10_000)) == list(range(9000))
+    assert sorted(side.nearest(rows[0], 30_000)) == list(range(20_000))
 
 
 def test_ties_go_to_the_older_in_the_tree_and_among_the_newest() -> None:
     grid = np.stack(np.meshgrid([-1.0, 0.0, 1.0], [-1.0, 0.0, 1.0]), axis=-1).reshape(-1, 2)
-    rows = np.tile(grid, (600, 1))[stream(0, "order").permutation(5400)]
-    side = TreeNeighbours(table(rows[:4000]))
-    assert side.nearest(np.zeros(2), 1).tolist() == nearest(rows[:4000], np.zeros(2), 1)  # builds the tree
-    side.keys.append(rows[4000:4100])
+    rows = np.tile(grid, (1200, 1))[stream(0, "order").permutation(10_800)]
+    side = TreeNeighbours(table(rows[:9000]))
+    assert side.nearest(np.zeros(2), 1).tolist() == nearest(rows[:9000], np.zeros(2), 1)  # builds the tree
+    side.keys.append(rows[9000:9100])
     for query in (np.zeros(2), np.ones(2), np.array([0.5, 0.5]), np.array([0.5, 0.0])):
-        for k in (1, 10, 700, 4050, 5000):
-            assert side.nearest(query, k).tolist() == nearest(rows[:4100], query, k)
+        for k in (1, 10, 1500, 9050, 10_000):
+            assert side.nearest(query, k).tolist() == nearest(rows[:9100], query, k)
 
 
 def test_many_copies_of_one_outcome_make_no_deep_tree() -> None:
@@ -69,7 +77,8 @@ def test_above_it_nearly_all_are_found_nearest_first_and_within_the_radius() -> 
         hits += len({*found.tolist()} & {*nearest(rows, rows[row], 10)})
     assert hits >= 0.95 * 10 * len(asked)
     for row, found in zip(asked[:20], side.nearest(rows[asked[:20]], 10, within=0.3), strict=True):
-        assert (np.square(rows[found] - rows[row]).sum(axis=1) <= 0.3**2).all()
+        assert (np.square(rows[found[found >= 0]] - rows[row]).sum(axis=1) <= 0.3**2).all()
+        assert found[0] == row
 
 
 def test_what_is_found_depends_on_the_rows_alone_not_on_when_it_was_asked_or_loaded() -> None:
@@ -82,6 +91,18 @@ def test_what_is_found_depends_on_the_rows_alone_not_on_when_it_was_asked_or_loa
     queries = rows[::400]
     for one, other in zip(at_once.nearest(queries, 20, 0.4), grown.nearest(queries, 20, 0.4), strict=True):
         assert one.tolist() == other.tolist()
+
+
+@pytest.mark.parametrize("n", [3000, EXACT_UP_TO + 3000])
+def test_the_neighbours_of_a_row_that_are_kept_are_those_of_a_fresh_look(n: int) -> None:
+    rows, rng = np.round(structured(n, 6), 1), stream(0, "asked")  # rounded: many ties
+    side = PolicyNeighbours(Table(6))
+    for start in range(0, n, n // 7):
+        side.keys.append(rows[start : start + n // 7])
+        for k, within in ((1, np.inf), (20, 0.2), (5, np.inf), (30, np.inf)):
+            asked = rng.integers(0, len(side.keys), 10)
+            fresh = PolicyNeighbours(side.keys).nearest(rows[asked], k, within)
+            assert side.around(asked, k, within).tolist() == fresh.tolist()
 
 
 def test_keys_and_queries_beyond_float32_are_still_answered() -> None:

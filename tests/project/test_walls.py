@@ -33,6 +33,7 @@ LIBRARIES = {  # rooms or single files that may import a library, by library
     "scipy": ROW.keys() - {"spaces"},
     "lazy_loader": {"__init__"},
     "faiss": {"memory/neighbours"},
+    "numba": {"memory/compiled", "memory/scan", "inverses/kernels"},
     "mujoco": {
         "environments/rod_physics",
         "views/film",
@@ -222,6 +223,7 @@ def loaded_by(program: str) -> set[str]:
 
 
 HEAVY = {
+    "numba",
     "torch",
     "lightning",
     "pytorch_lightning",
@@ -240,6 +242,14 @@ def test_importing_the_package_loads_no_heavy_library():
     loaded = loaded_by("import sgimd_torch; sgimd_torch.sgim_d, sgimd_torch.run")
     assert "sgimd_torch.algorithms" in loaded
     assert not (HEAVY | {"mujoco"}) & loaded
+
+
+def test_learning_loads_numba_only_when_the_memory_is_searched():
+    program = (
+        "import sgimd_torch as s; arm = s.PlanarArm(3); learner = s.{}(arm, 0); [*s.run(learner, arm, 0, movements=3)]"
+    )
+    assert "numba" not in loaded_by(program.format("random_exploration"))
+    assert "numba" in loaded_by(program.format("practice"))
 
 
 @pytest.mark.parametrize("words", [["--help"], ["run", "--help"], ["--version"]])

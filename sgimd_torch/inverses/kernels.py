@@ -1,0 +1,407 @@
+"""What `LocalProcess` and `LocallyLinear` compute for one goal, compiled by numba.
+
+A local Gaussian process is fitted to a hundred movements and asked about some fifty candidates, by arrays so small that
+calls of numpy would take ten times as long as their arithmetic. Compiled functions release Python's lock.
+Import this module through `compiled`: loading numba takes half a second.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numba import njit, types
+
+from sgimd_torch.spaces import Array
+
+STEPS, STARTS = 4, 3  # number of Gauss-Newton steps from each start, and of exemplars where steps begin
+DAMPINGS: Final = (1e-3, 0.1, 1.0, 10.0)
+CLEARLY: Final = 0.8  # error, relative to that of the nearest exemplar, below which a candidate is clearly better
+ALPHA, WIDTH = 0.5, 1.0  # weight of a neighbourhood's spread in eq. (8), and width of the Gaussian of eq. (9)
+# Ridge, relative to the variance of the outcomes; with a larger ridge the answer is nearer to eq. (9). The ridge also
+# makes the regression unique when outcomes lie on a line, or are fewer than the slopes.
+RIDGE: Final = 1e-3
+COINCIDENT: Final = 1e-12  # least spread of outcomes relative to their size; below it, they count as one: no slope
+TINY: Final = 1e-300
+SMALLEST: Final = float(np.finfo(float).tiny)
+ROOT5: Final = float(np.sqrt(5))
+
+_FAST: Final = {"reassoc", "contract", "nsz", "arcp"}  # sums may be reordered; NaN and infinity keep their meaning
+_inner = njit(nogil=True, fastmath=_FAST)
+_number, _numbers = types.float64, types.Array(types.float64, 1, "C", readonly=True)
+_table, _rows = types.Array(types.float64, 2, "C", readonly=True), types.Array(types.int64, 1, "C", readonly=True)
+_lists = types.Array(types.int64, 2, "C", readonly=True)
+
+
+def _called(*arguments: types.Type) -> Any:
+    """Decorator of a function that Python calls. Its types are given, so it is compiled when this module is loaded."""
+    return njit(tuple(arguments), cache=True, nogil=True, fastmath=_FAST)
+
+
+class Process(NamedTuple):
+    """Gaussian process, given some movements.
+
+    Attributes:
+        inputs: ``(dim, n)``, theta and context of each movement, in lengths.
+        kernel: ``(4,)``, scale, finer, share and noise of a `gaussian_process.Kernel`.
+        factor: ``(n, n)`` Cholesky factor of the covariance of the movements.
+        weights: ``(outcome_dim, n)``, inverse covariance times outcomes.
+        mean: ``(outcome_dim,)``, mean outcome.
+        variance: most likely variance, by which the kernel is multiplied.
+    """
+
+    inputs: Array
+    kernel: Array
+    factor: Array
+    weights: Array
+    mean: Array
+    variance: float
+
+
+@_inner
+def squared_distance(one: Array, other: Array) -> float:
+    """Squared distance of two points."""
+    total = 0.0
+    for k in range(len(one)):
+        total += (one[k] - other[k]) ** 2
+    return total
+
+
+@_inner
+def columns(table: Array, rows: np.ndarray) -> Array:
+    """``(dim, n)``, these rows of a table."""
+    found = np.empty((table.shape[1], len(rows)))
+    for j in range(len(rows)):
+        for k in range(len(found)):
+            found[k, j] = table[rows[j], k]
+    return found
+
+
+@_inner
+def matern(distance: float) -> tuple[float, float]:
+    """Matern 5/2 kernel, and its derivative divided by the distance."""
+    decay = np.exp(-ROOT5 * distance)
+    return (1 + ROOT5 * distance + 5 / 3 * distance**2) * decay, -5 / 3 * (1 + ROOT5 * distance) * decay
+
+
+@_inner
+def covariances(inputs: Array, kernel: Array, point: Array, covariance: Array, slope: Array) -> None:
+    """Write the covariances of ``point`` ``(dim,)`` with the first ``len(covariance)`` of ``inputs`` ``(dim, n)``, and
+    their derivatives by the point, divided by the difference of the inputs."""
+    scale, finer, share, n = kernel[0], kernel[1], kernel[2], len(covariance)
+    covariance[:] = 0
+    for k in range(len(point)):
+        for j in range(n):
+            covariance[j] += (inputs[k, j] - point[k]) ** 2
+    for j in range(n):
+        distance = scale * np.sqrt(covariance[j])
+        covariance[j], slope[j] = matern(distance)
+        if share > 0:
+            rough, rough_slope = matern(finer * distance)
+            covariance[j] += share * (rough - covariance[j])
+            slope[j] += share * (finer**2 * rough_slope - slope[j])
+        slope[j] *= scale**2
+
+
+@_inner
+def correlation(inputs: Array, kernel: Array) -> Array:
+    """Covariance matrix ``(n, n)`` of ``inputs`` ``(dim, n)``, without noise; the lower half alone."""
+    n = inputs.shape[1]
+    found, slope = np.zeros((n, n)), np.empty(n)
+    for i in range(n):
+        covariances(inputs, kernel, inputs[:, i].copy(), found[i, : i + 1], slope)
+    return found
+
+
+@_inner
+def solve_lower(lower: Array, b: Array) -> None:
+    """``b`` ``(n,)`` becomes ``lower``^-1 b."""
+    for i in range(len(b)):
+        total = 0.0
+        for k in range(i):
+            total += lower[i, k] * b[k]
+        b[i] = (b[i] - total) / lower[i, i]
+
+
+@_inner
+def solve_transposed(lower: Array, b: Array) -> None:
+    """``b`` ``(n,)`` becomes ``lower``^-T b."""
+    for i in range(len(b) - 1, -1, -1):
+        b[i] /= lower[i, i]
+        for k in range(i):
+            b[k] -= lower[i, k] * b[i]
+
+
+@_inner
+def fitted(inputs: Array, outcomes: Array, kernel: Array) -> Process:
+    """The process of movements with ``inputs`` ``(dim, n)`` and ``outcomes`` ``(outcome_dim, n)``."""
+    m, n = outcomes.shape
+    covariance = correlation(inputs, kernel)
+    for i in range(n):
+        covariance[i, i] += kernel[3]
+    factor = np.ascontiguousarray(np.linalg.cholesky(covariance))
+    weights, mean, total = np.empty((m, n)), np.empty(m), 0.0
+    for k in range(m):
+        mean[k] = outcomes[k].sum() / n
+        weights[k] = outcomes[k] - mean[k]
+        solve_lower(factor, weights[k])
+        total += weights[k] @ weights[k]
+        solve_transposed(factor, weights[k])
+    return Process(inputs, kernel, factor, weights, mean, max(total / (n * m), TINY))
+
+
+@_inner
+def precisions(factor: Array, last: int) -> Array:
+    """Diagonal of the inverse covariance for the ``last`` movements, which need the last corner of the factor alone."""
+    first = len(factor) - last
+    root, found = np.linalg.inv(factor[first:, first:].copy()), np.zeros(last)
+    for j in range(last):
+        for i in range(j, last):
+            found[j] += root[i, j] ** 2
+    return found
+
+
+@_inner
+def unknown(process: Process, covariance: Array) -> float:
+    """Variance of the outcome of a point that has this ``covariance`` with the inputs, without noise."""
+    known = covariance.copy()
+    solve_lower(process.factor, known)
+    return process.variance * max(1 - float(known @ known), 0.0)
+
+
+@_inner
+def expected(process: Process, covariance: Array) -> Array:
+    """Expected outcome of a point that has this ``covariance`` with the inputs."""
+    return process.weights @ covariance + process.mean
+
+
+@_inner
+def expected_error(process: Process, goal: Array, doubt: float, covariance: Array, limit: float) -> float:
+    """Expected squared error, the variance times ``doubt`` included; any number above ``limit`` if it is larger."""
+    error = squared_distance(expected(process, covariance), goal)
+    return error if error >= limit else error + doubt * unknown(process, covariance)
+
+
+@_inner
+def in_lengths(theta: Array, context: Array, units: Array) -> Array:
+    """Input ``(dim,)`` of the process; ``units``: ``(2, dim)``, origin and size of a length."""
+    found, t = np.empty(units.shape[1]), len(theta)
+    for k in range(len(found)):
+        found[k] = ((theta[k] if k < t else context[k - t]) - units[0, k]) / units[1, k]
+    return found
+
+
+@_inner
+def descend(
+    process: Process, start: Array, context: Array, goal: Array, doubt: float, units: Array, spreads: Array, box: Array
+) -> tuple[float, Array]:
+    """Least expected squared error, and its theta, after damped Gauss-Newton steps from ``start`` ``(theta_dim,)``.
+    Steps end when they do not help; each is as short as possible, so unimportant parameters hardly change."""
+    n, t, m = process.inputs.shape[1], len(start), len(goal)
+    least, found = np.inf, start
+    covariance, slope = np.empty((1 + len(DAMPINGS), n)), np.empty((1 + len(DAMPINGS), n))
+    tried, jacobian = np.empty((len(DAMPINGS), t)), np.empty((m, t))
+    covariances(process.inputs, process.kernel, in_lengths(found, context, units), covariance[0], slope[0])
+    for _ in range(STEPS):
+        here = in_lengths(found, context, units)
+        for k in range(m):
+            pull = process.weights[k] * slope[0]
+            back = process.inputs @ pull
+            for i in range(t):
+                jacobian[k, i] = (here[i] * pull.sum() - back[i]) * spreads[i] / units[1, i]
+        ahead, squares = goal - expected(process, covariance[0]), jacobian @ jacobian.T
+        size, better = np.trace(squares) / m + TINY, 0
+        for d in range(len(DAMPINGS)):
+            step = np.linalg.solve(squares + size * DAMPINGS[d] * np.eye(m), ahead) @ jacobian
+            for i in range(t):
+                tried[d, i] = min(max(found[i] + spreads[i] * step[i], box[0, i]), box[1, i])
+            here = in_lengths(tried[d], context, units)
+            covariances(process.inputs, process.kernel, here, covariance[1 + d], slope[1 + d])
+            error = expected_error(process, goal, doubt, covariance[1 + d], least)
+            if error < least:
+                least, better = error, 1 + d
+        if not better:
+            break
+        found, covariance[0], slope[0] = tried[better - 1].copy(), covariance[better], slope[better]
+    return least, found
+
+
+@_inner
+def learnt_from(near: np.ndarray, alike: np.ndarray, n: int) -> np.ndarray:
+    """Rows that a process is fitted to: those of ``alike``, which are nearest first in each list, by turns, and at the
+    end those ``near`` the goal."""
+    rows, new = np.empty(alike.shape[1], np.int64), np.ones(n, np.bool_)
+    rows[len(rows) - len(near) :] = near
+    new[near] = False
+    count = 0
+    for i in range(alike.shape[1]):
+        for row in alike[:, i]:
+            if new[row] and count < len(rows) - len(near):
+                rows[count], new[row] = row, False
+                count += 1
+    return rows
+
+
+@_called(_rows, _lists, _table, _table, _table, _numbers, _numbers, _numbers, _numbers, _table, _numbers, _table)
+def answer(
+    near: np.ndarray,
+    alike: np.ndarray,
+    inputs: Array,
+    thetas: Array,
+    outcomes: Array,
+    context: Array,
+    goal: Array,
+    kernel: Array,
+    linear: Array,
+    units: Array,
+    spreads: Array,
+    box: Array,
+) -> Array:
+    """theta of the candidate with the least expected squared error; that of the nearest exemplar, unless another one is
+    clearly better.
+
+    Args:
+        near: ``(k,)`` rows of the nearest outcomes, nearest first.
+        alike: ``(m, n)`` rows of the movements most like the first of these.
+        inputs: ``(n, dim)``, all movements in lengths.
+        thetas, outcomes: ``(n, theta_dim)`` and ``(n, outcome_dim)``, all movements in memory.
+        context, goal: question.
+        kernel: ``(4,)``, see `Process`.
+        linear: ``(theta_dim,)``, answer of `LocallyLinear`.
+        units: ``(2, dim)``, see `in_lengths`.
+        spreads: ``(theta_dim,)``, unit of the steps.
+        box: ``(2, theta_dim)``, corners of the box around all thetas.
+    """
+    rows, m, noise = learnt_from(near, alike, len(thetas)), len(goal), kernel[3]
+    first = len(rows) - len(near)
+    process = fitted(columns(inputs, rows), columns(outcomes, rows), kernel)
+    precision = precisions(process.factor, len(near))
+    # The mean squared error of predicting each exemplar from all others, divided by the expected one.
+    surprise = 0.0
+    for j in range(len(near)):
+        for k in range(m):
+            surprise += process.weights[k, first + j] ** 2 / precision[j] / (len(near) * m * process.variance)
+    # Two corrections inflate the variance: one for surprising exemplars here, and one because a process with many
+    # lengths, fitted to few movements, errs most at the candidates that look best.
+    doubt = m * max(1.0, surprise) * (1 + units.shape[1] ** 2 / len(thetas))
+    covariance, slope = np.empty(len(rows)), np.empty(len(rows))
+    least, nearest, best = np.inf, np.inf, linear
+    for j in range(len(near)):
+        if len(context):
+            covariances(process.inputs, kernel, in_lengths(thetas[near[j]], context, units), covariance, slope)
+            error = expected_error(process, goal, doubt, covariance, least)
+        else:  # its outcome without its noise, and the variance of that
+            error = doubt * process.variance * noise * max(1 - noise * precision[j], 0.0)
+            for k in range(m):
+                error += (outcomes[near[j], k] - noise * process.weights[k, first + j] - goal[k]) ** 2
+        if j == 0:
+            nearest = error
+        if error < least:
+            least, best = error, thetas[near[j]]
+    covariances(process.inputs, kernel, in_lengths(linear, context, units), covariance, slope)
+    error = expected_error(process, goal, doubt, covariance, least)
+    if error < least:
+        least, best = error, linear
+    for row in near[:STARTS]:
+        error, found = descend(process, thetas[row], context, goal, doubt, units, spreads, box)
+        if error < least:
+            least, best = error, found
+    return best.copy() if least < CLEARLY * nearest else thetas[near[0]].copy()
+
+
+@_inner
+def spread(outcomes: Array) -> float:
+    """Standard deviation of ``outcomes`` ``(outcome_dim, n)``."""
+    total, n = 0.0, outcomes.shape[1]
+    for k in range(len(outcomes)):
+        total += n * outcomes[k].var()
+    return np.sqrt(total / (n - 1))
+
+
+@_called(_lists, _table, _table, _numbers, _table)
+def locally_linear(alike: np.ndarray, thetas: Array, outcomes: Array, goal: Array, box: Array) -> tuple[int, Array]:
+    """The answer of `LocallyLinear`: the number of the best neighbourhood, and theta.
+
+    Args:
+        alike: ``(h, k)`` neighbourhoods K_h of eq. (8) as rows, theta_h first; -1 where there are fewer than k.
+        thetas, outcomes: ``(n, theta_dim)`` and ``(n, outcome_dim)``, all movements in memory.
+        goal: ``(outcome_dim,)``.
+        box: ``(2, theta_dim)``, corners of the box around all thetas.
+    """
+    sizes, spreads, n_known = np.zeros(len(alike), np.int64), np.empty(len(alike)), 0
+    for h in range(len(alike)):
+        while sizes[h] < alike.shape[1] and alike[h, sizes[h]] >= 0:
+            sizes[h] += 1
+        if sizes[h] > 1:  # a movement without neighbours gets the median of the other spreads, see `inverses.local`
+            spreads[n_known] = spread(columns(outcomes, alike[h, : sizes[h]]))
+            n_known += 1
+    middle, n_known = np.median(spreads[:n_known]) if n_known else 0.0, 0
+    best, least = 0, np.inf
+    for h in range(len(alike)):
+        unreliability = np.sqrt(squared_distance(outcomes[alike[h, 0]], goal))
+        unreliability += ALPHA * (spreads[n_known] if sizes[h] > 1 else middle)
+        n_known += sizes[h] > 1
+        if unreliability < least:
+            best, least = h, unreliability
+    rows = alike[best, : sizes[best]]
+    there, landed = columns(thetas, rows), columns(outcomes, rows)
+    weights = np.array([np.sqrt(squared_distance(landed[:, j], goal)) for j in range(len(rows))])
+    weights /= max(SMALLEST, WIDTH * weights.mean())
+    weights = np.exp(0.5 * (weights.min() ** 2 - weights**2))  # eq. (9), see `inverses.local`
+    weights /= weights.sum()
+    theta, outcome, largest = there @ weights, landed @ weights, np.abs(landed).max()
+    for k in range(len(theta)):  # a mean lies between the values that it averages; rounding must not move it out
+        theta[k] = min(max(theta[k], there[k].min()), there[k].max())
+        there[k] -= theta[k]
+    for k in range(len(outcome)):
+        landed[k] -= outcome[k]
+    covariance = (landed * weights) @ landed.T
+    variance = np.trace(covariance)
+    if variance > (COINCIDENT * largest) ** 2:
+        slope = np.linalg.solve(covariance + RIDGE * variance * np.eye(len(goal)), goal - outcome)
+        step = there @ (weights * (slope @ landed))
+        theta = np.minimum(np.maximum(theta + step, box[0]), box[1])
+    return best, theta
+
+
+@_called(_table, _table, _rows, _numbers, _numbers)
+def foretell(inputs: Array, outcomes: Array, rows: np.ndarray, here: Array, kernel: Array) -> tuple[Array, float]:
+    """Expected outcome of a movement, and its variance, by the process of the movements in ``rows``."""
+    process = fitted(columns(inputs, rows), columns(outcomes, rows), kernel)
+    covariance, slope = np.empty(len(rows)), np.empty(len(rows))
+    covariances(process.inputs, kernel, here.copy(), covariance, slope)
+    return expected(process, covariance), unknown(process, covariance)
+
+
+@_called(_table, _table, _table, _numbers, _number)
+def scores(inputs: Array, outcomes: Array, kernels: Array, noises: Array, stated: float) -> Array:
+    """Log likelihoods ``(kernels, noises)`` of movements under each kernel with each noise, see `choose_kernel`.
+
+    Args:
+        inputs: ``(dim, n)``, in lengths.
+        outcomes: ``(outcome_dim, n)``, of mean 0.
+        kernels: ``(kernels, 4)``, see `Process`; their noise is not used.
+        noises: ``(noises,)``, variances relative to the kernel's.
+        stated: standard deviation of the noise, as the environment states it.
+    """
+    m, n = outcomes.shape
+    found = np.empty((len(kernels), len(noises)))
+    for g in range(len(kernels)):
+        covariance, noise = correlation(inputs.copy(), kernels[g]), 0.0
+        for a in range(len(noises)):
+            for i in range(n):
+                covariance[i, i] += noises[a] - noise
+            noise = noises[a]
+            factor = np.ascontiguousarray(np.linalg.cholesky(covariance))
+            total, logs = 0.0, 0.0
+            for k in range(m):
+                white = outcomes[k].copy()
+                solve_lower(factor, white)
+                total += white @ white
+            for i in range(n):
+                logs += np.log(factor[i, i])
+            variance = max(total / (n * m), TINY)
+            found[g, a] = -0.5 * m * (n * np.log(variance) + 2 * logs)
+            if stated > 0:
+                found[g, a] -= 2 * m * np.log(noise * variance / stated**2) ** 2 * n / 60
+    return found

@@ -1,0 +1,59 @@
+"""Compiled functions: compiled once, with a word about it, wherever the result can be kept."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import sgimd_torch
+
+PROGRAM = """
+import numpy as np
+from sgimd_torch.memory.neighbours import Table, TreeNeighbours
+side = TreeNeighbours(Table(1)); side.keys.append(np.arange(5.0)[:, None])
+print(*side.nearest(np.array([3.2]), 2))
+"""
+SAID = "compiling once, about 15 s\n"
+
+
+@pytest.fixture
+def package(tmp_path: Path) -> Path:
+    """A copy of the package without caches, whose folders of compiled functions cannot be written to."""
+    place, copied = Path(sgimd_torch.__path__[0]), tmp_path / "library" / "sgimd_torch"
+    shutil.copytree(place, copied, ignore=shutil.ignore_patterns("__pycache__"))
+    (copied / "memory" / "__pycache__").touch()  # not even root makes a folder of it
+    return copied
+
+
+def started(package: Path, **variables: str) -> subprocess.Popen[str]:
+    kept = {name: value for name, value in os.environ.items() if not name.startswith(("NUMBA", "XDG"))}
+    return subprocess.Popen(
+        [sys.executable, "-B", "-c", PROGRAM],
+        cwd=package.parent,
+        env={**kept, "PYTHONPATH": "", **variables},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def test_two_processes_compile_at_once_for_a_third_though_the_package_cannot_be_written_to(package, tmp_path):
+    variables = {"XDG_CACHE_HOME": str(tmp_path / "cache"), "HOME": str(tmp_path / "home")}
+    both = [started(package, **variables) for _ in range(2)]
+    assert [process.communicate() for process in both] == [("3 4\n", SAID)] * 2
+    assert started(package, **variables).communicate() == ("3 4\n", "")
+
+
+def test_the_cache_is_where_the_user_says(package, tmp_path):
+    for said in (SAID, ""):
+        assert started(package, NUMBA_CACHE_DIR=str(tmp_path / "mine")).communicate() == ("3 4\n", said)
+    assert list((tmp_path / "mine").rglob("*.nbc"))
+
+
+def test_where_nothing_can_be_written_it_compiles_for_this_process_alone(package, tmp_path):
+    (tmp_path / "file").touch()
+    nowhere = {"HOME": str(tmp_path / "file"), "XDG_CACHE_HOME": str(tmp_path / "file")}
+    assert started(package, **nowhere).communicate() == ("3 4\n", SAID)
