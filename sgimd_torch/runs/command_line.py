@@ -9,36 +9,33 @@ Examples:
 
 from __future__ import annotations
 
-import inspect
 import shlex
 import sys
 import textwrap
 import types
 import typing
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final, get_type_hints
+from typing import Any, Final
 
 from sgimd_torch.catalogue import WORDS, about
-from sgimd_torch.catalogue.options import help_of
+from sgimd_torch.catalogue.options import Option, help_of
 from sgimd_torch.runs.config import FLAGS, RUN, Config, Part, chosen, dashed, typed
 from sgimd_torch.runs.process import Stopping, loading
 
-ALONE: Final = "practice"  # the default learner of a robot without demonstrations
 _PARTS: Final = [kind for kind in WORDS if kind not in ("algorithm", "command")]
 _PLACES: Final = {"progress": "goals.progress", "choose": "teacher.choose"}  # options that choose parts of other parts
 _WIDTH: Final = 120
-_TYPES: Final = {  # names of types in help, longest first
-    "tuple[float, float]": "two numbers with a comma between",
-    "tuple[int, ...]": "whole numbers with commas",
-    "tuple[str, ...]": "names with commas",
-    "pathlib.Path": "a path",
-    "float": "a number",
-    "int": "a whole number",
-    "str": "text",
-    "bool": "true or false",
-    "None": "null",
-    " |": " or",
+_NAMES: Final[dict[Any, str]] = {  # of types, in help and in errors
+    float: "a number",
+    int: "a whole number",
+    str: "text",
+    bool: "true or false",
+    Path: "a path",
+    types.NoneType: "null",
+    tuple[float, float]: "two numbers with a comma between",
+    tuple[int, ...]: "whole numbers with commas",
+    tuple[str, ...]: "names with commas",
 }
 
 
@@ -70,13 +67,12 @@ def parse(argv: Sequence[str], description: str | None = None) -> tuple[Config, 
         if "help" in asked and not given:
             print(overview(description))
             raise SystemExit(0)
-        if "algorithm" not in given:
-            given["algorithm"] = _suited(given)
-        parts = chosen(given["algorithm"], given, asks="teachers" in given)
+        parts = chosen({"algorithm": Config.algorithm, **given})
         if "help" in asked:
             print(help_on(parts))
             raise SystemExit(0)
-        values = _values(given, parts)
+        options = RUN | {name: each for part in parts.values() for name, each in part.options.items()}
+        values = {name: _typed(name, text, options) for name, text in given.items()}
         own = {name: values.pop(name) for name in RUN if name in values}
         return Config(**own, parts=values), {flag: flag in asked for flag in FLAGS}
     except ValueError as error:
@@ -112,33 +108,16 @@ def _read(argv: Sequence[str]) -> tuple[dict[str, str], set[str]]:
     return given, asked
 
 
-def _suited(given: Mapping[str, str]) -> str:
-    """The default algorithm for a robot: a taught one if there are demonstrations, else one that learns alone."""
-    robot = {name: text for name, text in given.items() if name.partition(".")[0] == "environment"}
-    if not robot or "demonstrations" in given:
-        return Config.algorithm
-    with loading():
-        from sgimd_torch.runs.build import has_demonstrations
-    config = Config(ALONE, parts=_values(robot, chosen(ALONE, robot)))
-    return Config.algorithm if has_demonstrations(config) else ALONE
-
-
-def _values(given: Mapping[str, str], parts: Mapping[str, Part]) -> dict[str, Any]:
-    """The typed values, converted to the types of the options; names of parts and values of unknown options stay text.
+def _typed(name: str, text: str, options: Mapping[str, Option]) -> Any:
+    """A typed value, converted to the type of its option; names of parts and values of unknown options stay text.
 
     Raises:
-        ValueError: a value is of another type.
+        ValueError: the value is of another type.
     """
-    hints, found = get_type_hints(Config), dict[str, Any](given)
-    kinds = {name: hints[name] for name in RUN}
-    kinds |= {part.full(name): option.kind for part in parts.values() for name, option in part.options.items()}
-    for name, text in given.items():
-        if name in kinds and name not in parts:
-            try:
-                found[name] = _value(text, kinds[name])
-            except ValueError as error:
-                raise ValueError(f"--{dashed(name)} must be {_wanted(kinds[name])}, got {text}") from error
-    return found
+    try:
+        return _value(text, options[name].kind) if name in options else text
+    except ValueError as error:
+        raise ValueError(f"--{dashed(name)} must be {_wanted(options[name].kind)}, got {text}") from error
 
 
 def _value(text: str, kind: Any) -> Any:
@@ -165,25 +144,20 @@ def _value(text: str, kind: Any) -> Any:
 
 def _wanted(kind: Any) -> str:
     """Name of a type, for somebody who types a value of this type."""
-    text = inspect.formatannotation(kind)
-    for python, plain in _TYPES.items():
-        text = text.replace(python, plain)
-    return text
+    return _NAMES[kind] if kind in _NAMES else " or ".join(map(_wanted, typing.get_args(kind)))
 
 
 def overview(description: str | None) -> str:
     """Text of ``sgimd run --help``: options and flags of every run, and names of parts."""
-    about_run = help_of(Config)
-    shown = {name: typed(getattr(Config, name)) for name in RUN}
-    run = {name: about_run[name] + f" ({text})" * (text != "null") for name, text in shown.items()} | FLAGS
     rivals = [word for word, at in WORDS["algorithm"].items() if at.startswith("rivals.")]
     lines = [
         "usage: sgimd run [--OPTION VALUE ...] [--resume]",
         "",
         *(description or "").splitlines(),
         "",
-        "options of every run, with the default in brackets (no brackets: the default is null, which means no value):",
-        *(_line(f"--{dashed(name)}", text) for name, text in run.items()),
+        "options of every run:",
+        *_described(RUN, Config),
+        *(_line(f"--{dashed(flag)}", text) for flag, text in FLAGS.items()),
         "names for --algorithm:",
         *(_line(word, about("algorithm", word)) for word in WORDS["algorithm"] if word not in rivals),
         _line("for comparison", f"{', '.join(rivals)}; these need the extra rivals"),
@@ -205,17 +179,23 @@ def help_on(parts: Mapping[str, Part]) -> str:
         "C: contexts, which the robot sees and cannot choose. Pi: movement parameters, theta.",
         "T: outcomes; a goal is a point of T. The paper: Nguyen & Oudeyer (2014).",
     ]
-    for part in parts.values():
-        described = help_of(part.make)
+    for name, part in parts.items():
         what = [about(part.kind, part.word)] if part.word in WORDS[part.kind] else []
-        leads_to = [f"--{part.full(each)}={parts[part.full(each)].word}" for each in part.choices]
+        leads_to = [f"--{each}={parts[each].word}" for each in part.choices]
         what += [f"default or chosen parts, each of which can be replaced: {' '.join(leads_to)}"] if leads_to else []
-        lines += ["", textwrap.fill(f"--{part.name or part.kind} {part.word}: {'; '.join(what)}", _WIDTH)]
-        for name, option in part.options.items():
-            said = described.get(name, "").replace("``", "").replace("None", "null")
-            meant = f"{_wanted(option.kind)}; default: {typed(option.default)}"
-            lines.append(_line(f"--{dashed(part.full(name))}", f"{said} ({meant})"))
+        lines += ["", textwrap.fill(f"--{name or part.kind} {part.word}: {'; '.join(what)}", _WIDTH)]
+        lines += _described(part.options, part.make)
     return "\n".join(lines)
+
+
+def _described(options: Mapping[str, Option], make: Callable[..., Any]) -> list[str]:
+    """Lines of help on ``options``, which are keywords of ``make``; a default tells the type, unless it is null."""
+    found, described = [], help_of(make)
+    for name, (kind, default) in options.items():
+        said = described.get(name.rpartition(".")[2], "").replace("``", "").replace("None", "null").rstrip(".")
+        wanted = f"{_wanted(kind).removesuffix(' or null')}; " if default is None else ""
+        found.append(_line(f"--{dashed(name)}", f"{said} ({wanted}default: {typed(default)})"))
+    return found
 
 
 def _line(name: str, text: str) -> str:
