@@ -35,7 +35,11 @@ UNIFORM_PRACTICE: Final[Variant] = {
 SPARSE: Final = ("puck", "fetch")  # tasks where most movements do nothing
 SUITE: Final = {task: suited for task, suited in TASKS.items() if task not in SPARSE}
 EXACT: Final[Variant] = {"search.noise": 0.0}  # the simplex without noise
-COMPLETE: Final[Variant] = {"search.complete": True, "search.xatol": 1e-4, "search.fatol": 1e-4}  # it ends by the budget
+COMPLETE: Final[Variant] = {
+    "search.complete": True,
+    "search.xatol": 1e-4,
+    "search.fatol": 1e-4,
+}  # ends by the budget
 # Steps from the letter of the paper to our defaults, one change at a time: name, options before, options after. The
 # paper gives no numbers for the budget of a goal and for g_max. A budget of 60 movements, more than the 30 between two
 # demonstrations, sets no limit.

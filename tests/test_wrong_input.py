@@ -70,7 +70,7 @@ COMMANDS = {
     "run --environment toss:Toss --algorithm sgim-d": "Toss has no demonstrations, .* --algorithm practice",
     "run --algorithm random --environment toss:Toss --environment.noise 1": "environment toss:Toss has no such option",
     "run --algorithm sgim-d --demonstrations nothing.npz": "nothing.npz cannot be read or written: No such file",
-    "run --algorithm sgim-d --demonstrations shown.csv": "shown.csv is no demonstration file: .* sgimd demonstrations import",
+    "run --algorithm sgim-d --demonstrations shown.csv": "shown.csv is no demonstration file: .* demonstrations import",
     "run --benchmark shown.csv": "shown.csv is no benchmark: it is not an npz file",
     "run --out shown.csv --environment planar-arm-7": "shown.csv.* cannot be made: .* a file in its place",
     "sweep --vary goals=interest-map,unifrm": "unknown goals 'unifrm'; did you mean uniform?",

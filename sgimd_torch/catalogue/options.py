@@ -19,6 +19,17 @@ from sgimd_torch.catalogue import WORDS, function_of
 
 F = TypeVar("F", bound=Callable[..., Any])
 _SIMPLE: Final = (int, float, bool, str, Path, type(None), ...)
+_NAMES: Final[dict[Any, str]] = {  # of types, in help and in errors
+    float: "a number",
+    int: "a whole number",
+    str: "text",
+    bool: "true or false",
+    Path: "a path",
+    types.NoneType: "null",
+    tuple[float, float]: "two numbers with a comma between",
+    tuple[int, ...]: "whole numbers with commas",
+    tuple[str, ...]: "names with commas",
+}
 _NAMED: Final = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
 
 
@@ -108,3 +119,30 @@ def _is_simple(kind: Any) -> bool:
     if typing.get_origin(kind) in (tuple, typing.Union, types.UnionType):
         return all(map(_is_simple, typing.get_args(kind)))
     return kind in _SIMPLE
+
+
+def read(text: str, kind: Any) -> Any:
+    """``text`` as a value of type ``kind``; a list may be typed with brackets or without.
+
+    Raises:
+        ValueError: the text is of another type.
+    """
+    inner = typing.get_args(kind)
+    if typing.get_origin(kind) is tuple:
+        items = [item.strip() for item in text.removeprefix("[").removesuffix("]").split(",") if item]
+        kinds = [inner[0]] * len(items) if ... in inner else inner
+        return tuple(read(*each) for each in zip(items, kinds, strict=True))
+    if inner:  # a union, with None last
+        if text == "null" and types.NoneType in inner:
+            return None
+        return read(text, inner[0])
+    if kind is bool:
+        return bool(("false", "true").index(text))
+    if not text:
+        raise ValueError("nothing was typed")
+    return kind(text)
+
+
+def wanted(kind: Any) -> str:
+    """Name of a type, for somebody who types a value of this type."""
+    return _NAMES[kind] if kind in _NAMES else " or ".join(map(wanted, typing.get_args(kind)))

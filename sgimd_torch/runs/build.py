@@ -16,7 +16,7 @@ from sgimd_torch.learner import Learner
 from sgimd_torch.learner.requests import Demonstrator
 from sgimd_torch.parts import Inverse, Teacher
 from sgimd_torch.runs.config import ALGORITHM, OWN, Config
-from sgimd_torch.runs.tasks import Task, benchmark_of, correspondence_of, demonstrations_of
+from sgimd_torch.runs.tasks import Task, benchmark_of
 from sgimd_torch.spaces import Demonstration, stream
 
 
@@ -61,24 +61,27 @@ def build(config: Config) -> RunParts:
     """
     task = task_of(config)
     benchmark, notes, benchmark_crc32 = benchmark_of(task, config.benchmark)
-    asked = (config.teachers or ("all",)) if config.teaching == "teachers" else ()
-    makers = {word: load_word("teachers", word) for word in asked}
-    own = [config.constructor("teacher")] if "teacher" in config else []
     shown: dict[str, Any] = {}
-    demonstrations: Sequence[Demonstration] = []
+    teacher: Teacher | None = None
+    teachers: dict[str, Demonstrator] = {}
     demonstrations_crc32 = None
-    if any(map(_needs_demonstrations, (*makers.values(), *own))):
-        demonstrations, about_them, demonstrations_crc32 = demonstrations_of(task, config.demonstrations)
-        notes += about_them
     if config.teaching:
+        from sgimd_torch.runs.tasks.taught import correspondence_of, demonstrations_of  # not for learners alone
+
+        asked = (config.teachers or ("all",)) if config.teaching == "teachers" else ()
+        makers = {word: load_word("teachers", word) for word in asked}
+        own = [config.constructor("teacher")] if "teacher" in config else []
+        demonstrations: Sequence[Demonstration] = []
+        if any(map(_needs_demonstrations, (*makers.values(), *own))):
+            demonstrations, about_them, demonstrations_crc32 = demonstrations_of(task, config.demonstrations)
+            notes += about_them
         shown["correspondence"] = correspondence_of(task)
-    teacher = Teacher.of(own[0], demonstrations, stream(config.seed, "teacher")) if own else None
-    teachers = {
-        word: Demonstrator.of(make, demonstrations, stream(config.seed, f"teacher {word}"))
-        for word, make in makers.items()
-    }
-    if teachers:
-        shown["teachers"] = teachers
+        for make in own:
+            teacher = Teacher.of(make, demonstrations, stream(config.seed, "teacher"))
+        for word, make in makers.items():
+            teachers[word] = Demonstrator.of(make, demonstrations, stream(config.seed, f"teacher {word}"))
+        if teachers:
+            shown["teachers"] = teachers
     algorithm = f"algorithm {config.algorithm}"
     learner = called(algorithm, config.constructor(ALGORITHM), task.environment, config.seed, **shown)
     if not isinstance(learner, Learner):

@@ -242,32 +242,6 @@ class Part(NamedTuple):
     choices: Mapping[str, Callable[..., Any]]
 
 
-def part_of(name: str, kind: str, word: str | None, default: Callable[..., Any] | str) -> Part:
-    """A part of a run.
-
-    Args:
-        name: name of the part in the run, such as "goals.progress".
-        kind: kind of the part.
-        word: name in the catalogue, or package.module:attribute; None: the default part.
-        default: name of the default part, or its constructor, whose keywords are defaults of the options.
-
-    Raises:
-        ValueError: there is no such part, or a package that it needs is not installed.
-    """
-    standard = word_of(kind, default) if callable(default) else default
-    word = word or standard
-    if callable(default) and word == standard:
-        make, fixed = default, dict[str, Any]()
-    else:
-        make = load_word(kind, word)
-        fixed = make.keywords if isinstance(make, partial) else {}  # keywords that the name fixes
-
-    def named(found: Mapping[str, Any]) -> dict[str, Any]:
-        return {f"{name}.{each}" if name else each: value for each, value in found.items() if each not in fixed}
-
-    return Part(kind, word, standard, make, named(options_of(make)), named(choices_of(make)))
-
-
 def teaching(given: Mapping[str, Any]) -> str:
     """How a learner is taught: as the catalogue says, or, for a user's own learner, by whoever was given."""
     if ":" in given["algorithm"]:
@@ -283,14 +257,24 @@ def chosen(given: Mapping[str, Any]) -> dict[str, Part]:
         given: choices by name, such as "algorithm" or "goals"; other names are ignored.
 
     Raises:
-        ValueError: see ``part_of``.
+        ValueError: there is no such part, or a package that it needs is not installed.
     """
     found: dict[str, Part] = {}
 
     def take(name: str, kind: str, default: Callable[..., Any] | str) -> None:
-        part = found[name] = part_of(name, kind, given.get(name), default)
-        for each, value in part.choices.items():
-            take(each, each.rpartition(".")[2], value)
+        standard = word_of(kind, default) if callable(default) else default
+        word = given.get(name) or standard
+        if callable(default) and word == standard:
+            make, fixed = default, dict[str, Any]()
+        else:
+            make = load_word(kind, word)
+            fixed = make.keywords if isinstance(make, partial) else {}  # keywords that the word fixes
+        prefix = f"{name}." if name else ""
+        options = {prefix + each: option for each, option in options_of(make).items() if each not in fixed}
+        choices = {prefix + each: value for each, value in choices_of(make).items() if each not in fixed}
+        found[name] = Part(kind, word, standard, make, options, choices)
+        for each, value in choices.items():
+            take(each, each.removeprefix(prefix), value)
 
     take("environment", "environment", ROD)
     take(ALGORITHM, "algorithm", given["algorithm"])

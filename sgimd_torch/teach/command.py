@@ -21,7 +21,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from sgimd_torch.record.replay import ReplayError
+from sgimd_torch.record import ReplayError
 from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.process import Failed, loading, parser_of, say
