@@ -161,8 +161,8 @@ def test_a_resumed_run_keeps_its_evaluations_until_floor_at_changes(tmp_path, go
     assert len(evaluated) == 3
     assert go(tmp_path, "--resume", "--floor_at", "90") == 0
     assert evaluated[3:] == [(30, 0), (60, 0), (90, 2)]
-    assert go(tmp_path, "--resume") == 0  # null: all of them
-    assert evaluated[6:] == [(30, 2), (60, 2), (90, 2)]
+    assert go(tmp_path, "--resume") == 0  # null: only the end
+    assert evaluated[6:] == [(30, 0), (60, 0), (90, 2)]
     assert content_of(tmp_path / "sgim-d" / "seed-003") == reference
 
 
