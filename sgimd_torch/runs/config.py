@@ -167,7 +167,8 @@ class Config:
         Raises:
             ValueError: a value is out of its range, or an option does not exist.
         """
-        own = {name: tuple(value) if isinstance(value, list) else value for name, value in settings.items()}
+        own = dict(settings)
+        own |= {name: tuple(value) for name, value in own.items() if isinstance(value, list)}
         own |= {name: Path(own[name]) for name in ("out", *FILES) if own.get(name) is not None}
         parts = {name: value for name, value in own.items() if name not in RUN}
         return cls(**{name: own[name] for name in RUN if name in own}, parts=parts)

@@ -5,8 +5,7 @@ after --at movements; the default is the last number of movements at which all f
 without this evaluation are left out, and named below the table. The worst variant comes first.
 
 Errors and noise floors are means over seeds, in the unit of T. With 5 seeds or more, the number after ± is the standard
-deviation of the errors over seeds.
-Times are milliseconds per movement.
+deviation of the errors over seeds. Times are milliseconds per movement.
 
 --baseline adds a column: the interquartile mean of the differences error minus error of the baseline, at common seeds.
 With 5 seeds or more, the brackets have its 95 % bootstrap interval. A number below 0 is better than the baseline.
