@@ -21,7 +21,8 @@ from sgimd_torch.files import make_folder, write_text
 from sgimd_torch.runs.build import task_of
 from sgimd_torch.runs.config import OWN, Config
 from sgimd_torch.runs.read import Run
-from sgimd_torch.runs.tasks import benchmark_of, demonstrations_of
+from sgimd_torch.runs.tasks import benchmark_of
+from sgimd_torch.runs.tasks.taught import demonstrations_of
 from sgimd_torch.spaces import Array
 from variants import ALIKE, ANSWERS
 

@@ -34,14 +34,20 @@ UNIFORM_PRACTICE: Final[Variant] = {
 }
 SPARSE: Final = ("puck", "fetch")  # tasks where most movements do nothing
 SUITE: Final = {task: suited for task, suited in TASKS.items() if task not in SPARSE}
+EXACT: Final[Variant] = {"search.noise": 0.0}  # the simplex without noise
+COMPLETE: Final[Variant] = {
+    "search.complete": True,
+    "search.xatol": 1e-4,
+    "search.fatol": 1e-4,
+}  # ends by the budget
 # Steps from the letter of the paper to our defaults, one change at a time: name, options before, options after. The
 # paper gives no numbers for the budget of a goal and for g_max. A budget of 60 movements, more than the 30 between two
 # demonstrations, sets no limit.
 STEPS: Final[tuple[tuple[str, Variant, Variant], ...]] = (
     ("inverse", {"inverse": "paper"}, {"inverse": "linear"}),
-    ("simplex", {"search": "nelder-mead-complete"}, {"search": "nelder-mead-exact"}),
+    ("simplex", COMPLETE, {"search.complete": False, "search.xatol": 0.1, "search.fatol": 0.05}),
     ("budget", {"budget": 60}, {"budget": 15}),
-    ("noise", {}, {"search": "nelder-mead"}),
+    ("noise", EXACT, {"search.noise": 0.05}),
     ("progress", {"goals.progress": "absolute"}, {"goals.progress": "gained"}),
     ("giving-up", {"give_up": -1.0}, {"give_up": -0.5}),
     ("regions", {"goals.g_max": 50}, {"goals.g_max": 30}),
@@ -259,7 +265,7 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
         "absolute-progress": {**SGIM_D, "goals.progress": "absolute"},
         "paired-progress": {**SGIM_D, "goals.progress": "paired"},
         "attempt-competence": {**SGIM_D, "goals.progress": "absolute", "judge": "attempt"},
-        "search-nelder-mead-exact": {**SGIM_D, "search": "nelder-mead-exact"},
+        "search-nelder-mead-exact": {**SGIM_D, **EXACT},
         "search-perturb": {**SGIM_D, "search": "perturb"},
         "search-cma-es": {**SGIM_D, "search": "cma-es"},
     },

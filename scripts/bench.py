@@ -88,10 +88,11 @@ def measured(name: str, library: Path, movements: int) -> Figures:
 
 
 def resume(library: Path, movements: int) -> Figures:
-    """Times of a run with default options, and of its replay; both times include the start of the process."""
+    """Times of a taught run, and of its replay; both times include the start of the process."""
     with TemporaryDirectory() as folder:
-        fresh, _ = command_line(library, folder, f"--movements={movements}")
-        replay, _ = command_line(library, folder, f"--movements={movements}", "--resume")
+        words = "--algorithm=practice-taught", f"--movements={movements}"
+        fresh, _ = command_line(library, folder, *words)
+        replay, _ = command_line(library, folder, *words, "--resume")
     return {"run on the rod (s)": fresh, "its replay (s)": replay, "replay over run": replay / fresh}
 
 

@@ -17,6 +17,7 @@ import traceback
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -117,9 +118,11 @@ def run(
     before: dict[int, BeforeMovement] = {}
     with ExitStack() as until_the_end:
         if record is not None:
-            from sgimd_torch.record.replay import replay  # loaded here, as most programs keep no record
+            events = record.events()
+            if (recorded := next(events, None)) is not None:
+                from sgimd_torch.record.replay import replay  # most programs have no record to replay
 
-            before = yield from replay(learner, record.events(), teacher=teacher)
+                before = yield from replay(learner, chain([recorded], events), teacher=teacher)
             learner.listeners.append(record.add)
             until_the_end.callback(learner.listeners.remove, record.add)
         in_a_row = 0

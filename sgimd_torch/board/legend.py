@@ -13,8 +13,8 @@ LEGEND: Final[Mapping[str, str]] = {
     "error/p90": "90th percentile of the distance UNIT from a benchmark goal to the outcome of the movement for it.",
     "error/failed": "Number of movements of the evaluation that failed. A failed movement counts as rest.",
     "error/noise_floor": "Part UNIT of error/mean that motor noise alone makes.",
-    "error": "Mean error UNIT with the inverse model that the tag names, in place of the learner's own. All runs have "
-    "error/by_linear, which compares what the learners remember, whatever their inverse models are.",
+    "error": "Mean error UNIT with the inverse model that the tag names, in place of the learner's own, if "
+    "--evaluated-by adds one. It compares what the learners remember, whatever their inverse models are.",
     "competence": "Mean competence of the goals that a region remembers: 0 is a goal that is met, -1 an outcome no "
     "better than rest. R is all of C x T, R0 and R1 are its two parts, R01 is a part of R0; map/competence shows the "
     "regions. Each run has its own regions. After a cut of a region, its curve is the mean over its parts' goals.",

@@ -75,8 +75,6 @@ WORDS: Final[dict[str, dict[str, str]]] = {
     },
     "search": {
         "nelder-mead": "searches.simplex:NelderMead",
-        "nelder-mead-exact": "searches.simplex:exact",
-        "nelder-mead-complete": "searches.simplex:complete",
         "perturb": "searches.perturb:Perturb",
         "vary": "searches.perturb:Vary",
         "cma-es": "rivals.cma_es:CmaEs",
@@ -163,19 +161,44 @@ def place_of(kind: str, word: str) -> str:
     if word in WORDS[kind]:
         return f"{_PACKAGE.name}.{WORDS[kind][word]}"
     if ":" not in word:
-        raise unknown(kind, word, WORDS[kind], _meant(word))
+        module, dot, name = word.rpartition(".")
+        meant = f"is it {module}:{name}?" if dot else "or, for code of your own, package.module:attribute"
+        raise unknown(kind, word, WORDS[kind], f"; {meant}")
     return word
 
 
+def word_of(kind: str, make: Callable[..., Any]) -> str:
+    """The name of a class or function, or its place if it has no name; the inverse of ``place_of``."""
+    place = f"{function_of(make).__module__}:{function_of(make).__qualname__}"
+    return next((word for word, at in WORDS[kind].items() if f"{_PACKAGE.name}.{at}" == place), place)
+
+
 def load_word(kind: str, word: str) -> Callable[..., Any]:
-    """The class or function that ``word`` names.
+    """The class or function that ``word`` names; its module is searched in the working directory, too.
 
     Raises:
-        ValueError: the name is not in the catalogue, or its class or function cannot be loaded or called.
+        ValueError: there is none, its module cannot be imported, or it cannot be called; the message says why.
     """
-    made: Callable[..., Any] = load(place_of(kind, word), f"{kind} {word}" if ":" in word else "")
+    module, _, name = place_of(kind, word).partition(":")
+    what = f"{kind} {word}"
+    if module.endswith(".py"):
+        raise ValueError(f"{what}: write the module without .py and with dots, {module[:-3].replace('/', '.')}:{name}")
+    here = os.getcwd()
+    if here not in sys.path:
+        sys.path.append(here)
+    try:
+        found = importlib.import_module(module)
+    except (Exception, SystemExit) as error:  # a user's module may raise anything
+        if isinstance(error, ImportError) and word in WORDS[kind]:
+            raise ValueError(str(error)) from error  # it names the extra that installs what is missing
+        where = f"; is it installed, or in {here}?" if isinstance(error, ImportError) else ""
+        why = f"{type(error).__name__}: {error}{where}"
+        raise ValueError(f"{what}: the module {module} cannot be imported: {why}") from error
+    if not hasattr(found, name):
+        raise ValueError(f"{what}: {module} has no {name}{did_you_mean(name, dir(found), 3)}")
+    made: Callable[..., Any] = getattr(found, name)
     if not callable(made):
-        raise ValueError(f"{kind} {word} must be a class or a function, got a {type(made).__name__}")
+        raise ValueError(f"{what} must be a class or a function, got a {type(made).__name__}")
     return made
 
 
@@ -192,13 +215,6 @@ def about(kind: str, word: str) -> str:
         elif isinstance(node, ast.Assign) and isinstance(after, ast.Expr) and ast.unparse(node.targets[0]) == name:
             found = ast.literal_eval(after.value)
     return (found or "").partition("\n")[0].rstrip(".")
-
-
-def named(made: Callable[..., Any]) -> tuple[str, str] | None:
-    """Kind and name of a class or function of the catalogue; None for any other."""
-    place = f"{function_of(made).__module__}:{function_of(made).__qualname__}"
-    places = ((kind, word, f"{_PACKAGE.name}.{at}") for kind, words in WORDS.items() for word, at in words.items())
-    return next(((kind, word) for kind, word, at in places if at == place), None)
 
 
 def function_of(made: Callable[..., Any]) -> Callable[..., Any]:
@@ -222,38 +238,6 @@ def called(what: str, make: Callable[..., Any], *arguments: Any, **options: Any)
         raise ValueError(f"{what} cannot be made: it calls exit({end})") from end
 
 
-def load(place: str, what: str = "") -> Any:
-    """The attribute at ``package.module:attribute``; the working directory is searched, too.
-
-    Raises:
-        ValueError: there is no such module or attribute, or the module cannot be imported; the message says why.
-    """
-    module, _, attribute = place.partition(":")
-    what = what or place
-    if module.endswith(".py"):
-        raise ValueError(
-            f"{what}: write the module without .py and with dots, {module[:-3].replace('/', '.')}:{attribute}"
-        )
-    here = os.getcwd()
-    if here not in sys.path:
-        sys.path.append(here)
-    try:
-        found: Any = importlib.import_module(module)
-    except (Exception, SystemExit) as error:  # a user's module may raise anything
-        if isinstance(error, ImportError) and module.startswith(_PACKAGE.name):
-            raise ValueError(str(error)) from error  # it names the extra that installs what is missing
-        where = f"; is it installed, or in {here}?" if isinstance(error, ImportError) else ""
-        raise ValueError(
-            f"{what}: the module {module} cannot be imported: {type(error).__name__}: {error}{where}"
-        ) from error
-    for name in attribute.split("."):
-        if not hasattr(found, name):
-            public = [each for each in dir(found) if not each.startswith("_")]
-            raise ValueError(f"{what}: {module} has no {attribute}{did_you_mean(name, public, 3)}")
-        found = getattr(found, name)
-    return found
-
-
 def unknown(what: str, word: str, known: Collection[str], also: str = "") -> ValueError:
     """The error for an unknown ``word``; the message has the nearest ``known`` name, all known names, and ``also``."""
     near = did_you_mean(word, known)
@@ -265,15 +249,3 @@ def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:
     spelt = {each.lower().replace("_", "-"): each for each in known}
     near = get_close_matches(name.lower().replace("_", "-"), spelt, most, 0.5)
     return f"; did you mean {' or '.join(spelt[each] for each in near)}?" if near else ""
-
-
-def _meant(word: str) -> str:
-    """Hint for an unknown ``word``: its probable meaning."""
-    module, dot, name = word.rpartition(".")
-    if name in ("xml", "urdf"):
-        return (
-            f"; {word} is a model file: write a class that loads it (docs/own-robot.md), and give package.module:Class"
-        )
-    if os.path.isfile(f"{word.replace('.', '/')}.py"):
-        return f"; {word} is a module here; write {word}:NAME for a class or function in it"
-    return f"; is it {module}:{name}?" if dot else ", or, for code of your own, package.module:attribute"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, ABCMeta
+from abc import ABC
 from typing import Any, Self
 
 from sgimd_torch.catalogue import called, function_of, place_of
@@ -20,19 +20,16 @@ class Built(ABC):  # noqa: B024
                 is of another class.
         """
         kind = cls.__name__
-        if isinstance(make, str):
-            module, _, name = place_of(kind.lower(), make).partition(":")
-            raise ValueError(f"{kind} must be a class or a function, got {make!r}; from {module} import {name}")
         if isinstance(make, cls) or not callable(make):
-            finished = "finished " if isinstance(make, cls) else ""
-            raise ValueError(f"{kind} must be a class or a function, got a {finished}{type(make).__name__}")
-        found = function_of(make)
-        if isinstance(found, type) and not issubclass(found, cls):
-            raise ValueError(f"{found.__name__} must derive from {kind} of sgimd_torch.parts")
-        if isinstance(found, ABCMeta) and found.__abstractmethods__:
-            missing = ", ".join(sorted(found.__abstractmethods__))
-            raise ValueError(f"{found.__name__} has no {missing}, which every {kind} must have; see sgimd_torch.parts")
-        made: Any = called(f"{kind} {found.__name__}", make, *given)
+            got = f"a {'finished ' * isinstance(make, cls)}{type(make).__name__}"
+            if isinstance(make, str):
+                got = f"{make!r}; import {place_of(kind.lower(), make).partition(':')[2]}"
+            raise ValueError(f"{kind} must be a class or a function, got {got}")
+        name = function_of(make).__name__
+        if missing := getattr(function_of(make), "__abstractmethods__", ()):
+            raise ValueError(f"{name} has no {', '.join(sorted(missing))}, which every {kind} must have")
+        made: Any = called(f"{kind} {name}", make, *given)
         if not isinstance(made, cls):
-            raise ValueError(f"{found.__name__} must return an object of {kind}, returned a {type(made).__name__}")
+            wanted = f"derive a class from {kind} of sgimd_torch.parts"
+            raise ValueError(f"{name} must make a {kind}, made a {type(made).__name__}; {wanted}")
         return made

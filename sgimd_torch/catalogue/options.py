@@ -11,12 +11,25 @@ import inspect
 import types
 import typing
 from collections.abc import Callable
-from functools import partial, wraps
+from functools import cache, wraps
+from pathlib import Path
 from typing import Any, Final, NamedTuple, TypeVar, cast
 
+from sgimd_torch.catalogue import WORDS, function_of
+
 F = TypeVar("F", bound=Callable[..., Any])
-_SIMPLE: Final = (int, float, bool, str, type(None), ...)
-_TARGETS: Final[dict[Callable[..., Any], Callable[..., Any]]] = {}  # target of each function decorated with `hands_on`
+_SIMPLE: Final = (int, float, bool, str, Path, type(None), ...)
+_NAMES: Final[dict[Any, str]] = {  # of types, in help and in errors
+    float: "a number",
+    int: "a whole number",
+    str: "text",
+    bool: "true or false",
+    Path: "a path",
+    types.NoneType: "null",
+    tuple[float, float]: "two numbers with a comma between",
+    tuple[int, ...]: "whole numbers with commas",
+    tuple[str, ...]: "names with commas",
+}
 _NAMED: Final = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
 
 
@@ -27,10 +40,17 @@ class Option(NamedTuple):
     default: Any
 
 
+@cache
 def options_of(make: Callable[..., Any]) -> dict[str, Option]:
-    """Keywords of ``make`` that have a default and a simple type: number, text, bool, tuple of these, or None."""
+    """Keywords of ``make`` that have a default and a simple type: number, text, bool, path, tuple of these, or None."""
     found = {name: Option(_simple(each), each.default) for name, each in parameters_of(make).items()}
     return {name: each for name, each in found.items() if each.kind is not None and each.default is not _EMPTY}
+
+
+def choices_of(make: Callable[..., Any]) -> dict[str, Callable[..., Any]]:
+    """Keywords of ``make`` that choose a part: keywords called like a kind of the catalogue, with a default part."""
+    found = {name: each.default for name, each in parameters_of(make).items() if name in WORDS}
+    return {name: default for name, default in found.items() if callable(default) and default is not _EMPTY}
 
 
 def parameters_of(make: Callable[..., Any]) -> dict[str, inspect.Parameter]:
@@ -42,10 +62,10 @@ def help_of(make: Callable[..., Any]) -> dict[str, str]:
     """Description of each parameter in the docstring, as one line."""
     import docstring_parser  # a module that only help needs
 
-    while isinstance(make, partial):
-        make = make.func
+    make = function_of(make)
     decorated = make.__init__ if inspect.isclass(make) else make
-    found = help_of(_TARGETS[decorated]) if decorated in _TARGETS else {}
+    target = vars(decorated).get("hands_on") if inspect.isfunction(decorated) else None
+    found = {} if target is None else help_of(target)
     text = inspect.getdoc(make) or ""
     for each in docstring_parser.parse(text, docstring_parser.DocstringStyle.GOOGLE).params:
         about = " ".join((each.description or "").split()).partition(" Deviation:")[0]
@@ -74,8 +94,7 @@ def hands_on(target: Callable[..., Any], *names: str, **changed: Any) -> Callabl
         def made(*arguments: Any, **keywords: Any) -> Any:
             return function(*arguments, **{**changed, **keywords})
 
-        vars(made).update(__signature__=inspect.Signature(every))
-        _TARGETS[made] = target
+        vars(made).update(__signature__=inspect.Signature(every), hands_on=target)
         return cast(F, made)
 
     return decorate
@@ -89,7 +108,7 @@ def _simple(parameter: inspect.Parameter) -> Any:
     kind = parameter.annotation
     if isinstance(kind, str):
         try:
-            kind = eval(kind, vars(typing).copy())
+            kind = eval(kind, {**vars(typing), "Path": Path})
         except Exception:  # an unknown name is no simple type
             return None
     kind = type(parameter.default) if kind is _EMPTY else kind
@@ -100,3 +119,30 @@ def _is_simple(kind: Any) -> bool:
     if typing.get_origin(kind) in (tuple, typing.Union, types.UnionType):
         return all(map(_is_simple, typing.get_args(kind)))
     return kind in _SIMPLE
+
+
+def read(text: str, kind: Any) -> Any:
+    """``text`` as a value of type ``kind``; a list may be typed with brackets or without.
+
+    Raises:
+        ValueError: the text is of another type.
+    """
+    inner = typing.get_args(kind)
+    if typing.get_origin(kind) is tuple:
+        items = [item.strip() for item in text.removeprefix("[").removesuffix("]").split(",") if item]
+        kinds = [inner[0]] * len(items) if ... in inner else inner
+        return tuple(read(*each) for each in zip(items, kinds, strict=True))
+    if inner:  # a union, with None last
+        if text == "null" and types.NoneType in inner:
+            return None
+        return read(text, inner[0])
+    if kind is bool:
+        return bool(("false", "true").index(text))
+    if not text:
+        raise ValueError("nothing was typed")
+    return kind(text)
+
+
+def wanted(kind: Any) -> str:
+    """Name of a type, for somebody who types a value of this type."""
+    return _NAMES[kind] if kind in _NAMES else " or ".join(map(wanted, typing.get_args(kind)))

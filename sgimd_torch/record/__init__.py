@@ -35,6 +35,7 @@ from sgimd_torch.record.layout import (
     HINT,
     SEALS,
     Dims,
+    ReplayError,
     Row,
     RunError,
     demonstration_row,
@@ -47,7 +48,7 @@ from sgimd_torch.record.layout import (
 )
 from sgimd_torch.spaces import Demonstration
 
-__all__ = ["DERIVED", "Dims", "Record", "RunError", "layout"]
+__all__ = ["DERIVED", "Dims", "Record", "ReplayError", "RunError", "layout"]
 
 _PATIENCE: Final = 60.0  # s, longest time that a commit waits for readers
 _AT_ONCE: Final = 4096  # number of rows that one query reads

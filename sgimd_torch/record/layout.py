@@ -25,6 +25,10 @@ class RunError(ValueError):
     """A record cannot be used: it is missing, damaged, in use, or belongs to another run."""
 
 
+class ReplayError(RuntimeError):
+    """The learner does not repeat its record, because library version, processor or configuration differ."""
+
+
 _COUNTED: Final = (Kind.MOVED, Kind.RESTED, Kind.FAILED)  # events that count as movements
 _IN_CONTEXT: Final = (*_COUNTED, Kind.ASKED, Kind.INTERRUPTED)  # events with a context
 

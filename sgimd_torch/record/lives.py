@@ -8,8 +8,8 @@ from collections.abc import Callable
 from sgimd_torch.files import replacing
 from sgimd_torch.learner import Learner
 from sgimd_torch.parts import Teacher
-from sgimd_torch.record import Record, RunError
-from sgimd_torch.record.replay import ReplayError, replay
+from sgimd_torch.record import Record, ReplayError, RunError
+from sgimd_torch.record.replay import replay
 from sgimd_torch.spaces import Move
 
 

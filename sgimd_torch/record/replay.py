@@ -15,13 +15,10 @@ import numpy as np
 from sgimd_torch.learner import Learner
 from sgimd_torch.learner.events import TEACHER, BeforeMovement, Event, Kind
 from sgimd_torch.parts import Teacher
+from sgimd_torch.record.layout import ReplayError
 from sgimd_torch.spaces import Array, Demonstration, Episode, Failure, Request
 
 _HINT: Final = "was it recorded by another version, on another processor or with another configuration?"
-
-
-class ReplayError(RuntimeError):
-    """The learner does not repeat its record, because library version, processor or configuration differ."""
 
 
 def replay(

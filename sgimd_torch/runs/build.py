@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
-from typing import Any, Final
+from typing import Any
 
 from sgimd_torch.catalogue import called, function_of, load_word
 from sgimd_torch.environments.protocol import Environment
@@ -16,8 +15,8 @@ from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.learner import Learner
 from sgimd_torch.learner.requests import Demonstrator
 from sgimd_torch.parts import Inverse, Teacher
-from sgimd_torch.runs.config import ALGORITHM, OWN, Config, part_of
-from sgimd_torch.runs.tasks import Task, benchmark_of, correspondence_of, demonstrations_of
+from sgimd_torch.runs.config import ALGORITHM, OWN, Config
+from sgimd_torch.runs.tasks import Task, benchmark_of
 from sgimd_torch.spaces import Demonstration, stream
 
 
@@ -62,34 +61,35 @@ def build(config: Config) -> RunParts:
     """
     task = task_of(config)
     benchmark, notes, benchmark_crc32 = benchmark_of(task, config.benchmark)
-    makers = {word: load_word("teachers", word) for word in _asked(config)}
     shown: dict[str, Any] = {}
-    demonstrations: Sequence[Demonstration] = []
+    teacher: Teacher | None = None
+    teachers: dict[str, Demonstrator] = {}
     demonstrations_crc32 = None
     if config.teaching:
-        kinds = [*makers.values(), *([config.chosen["teacher"].make] if "teacher" in config.chosen else [])]
-        if any(_needs_demonstrations(each) for each in kinds):
+        from sgimd_torch.runs.tasks.taught import correspondence_of, demonstrations_of  # not for learners alone
+
+        asked = (config.teachers or ("all",)) if config.teaching == "teachers" else ()
+        makers = {word: load_word("teachers", word) for word in asked}
+        own = [config.constructor("teacher")] if "teacher" in config else []
+        demonstrations: Sequence[Demonstration] = []
+        if any(map(_needs_demonstrations, (*makers.values(), *own))):
             demonstrations, about_them, demonstrations_crc32 = demonstrations_of(task, config.demonstrations)
             notes += about_them
         shown["correspondence"] = correspondence_of(task)
-    teacher: Teacher | None = None
-    if "teacher" in config.chosen:
-        rng = stream(config.seed, "teacher")
-        teacher = Teacher.of(_maker(config, "teacher"), demonstrations, rng)
-    teachers = {
-        word: Demonstrator.of(make, demonstrations, stream(config.seed, f"teacher {word}"))
-        for word, make in makers.items()
-    }
-    if config.teaching == "teachers":
-        shown["teachers"] = teachers
+        for make in own:
+            teacher = Teacher.of(make, demonstrations, stream(config.seed, "teacher"))
+        for word, make in makers.items():
+            teachers[word] = Demonstrator.of(make, demonstrations, stream(config.seed, f"teacher {word}"))
+        if teachers:
+            shown["teachers"] = teachers
     algorithm = f"algorithm {config.algorithm}"
-    learner = called(algorithm, _maker(config, ALGORITHM), task.environment, config.seed, **shown)
+    learner = called(algorithm, config.constructor(ALGORITHM), task.environment, config.seed, **shown)
     if not isinstance(learner, Learner):
         raise ValueError(f"{algorithm} must return a Learner, got a {type(learner).__name__}")
     answers = {OWN: learner.inverse}
     for word in config.evaluated_by[1:]:
-        own = config.values.get("inverse") == word
-        answers[word] = learner.inverse if own else Inverse.of(load_word("inverse", word), learner.problem)
+        learnt_with = config.values.get("inverse") == word
+        answers[word] = learner.inverse if learnt_with else Inverse.of(load_word("inverse", word), learner.problem)
     return RunParts(
         config=config,
         task=task,
@@ -109,39 +109,10 @@ def task_of(config: Config) -> Task:
     Raises:
         ValueError: the environment cannot be built, or is no environment.
     """
-    found = _LOOKED_AT.pop(_place(config), None)
-    if found is not None:
-        return found
-    part = part_of("environment", "environment", config["environment"])
-    task = called(f"environment {part.word}", partial(part.make, **part.set_by(config.values)))
+    task = called(f"environment {config['environment']}", config.constructor("environment"))
     return task if isinstance(task, Task) else Task(task)
-
-
-def has_demonstrations(config: Config) -> bool:
-    """Whether the task has demonstrations. The next `task_of` returns this task: some robots can connect only once."""
-    task = _LOOKED_AT[_place(config)] = task_of(config)
-    return task.demonstrations is not None
-
-
-_LOOKED_AT: Final[dict[str, Task]] = {}
-
-
-def _place(config: Config) -> str:
-    return str([(name, value) for name, value in config.values.items() if name.partition(".")[0] == "environment"])
-
-
-def _asked(config: Config) -> tuple[str, ...]:
-    return (config.teachers or ("all",)) if config.teaching == "teachers" else ()
 
 
 def _needs_demonstrations(make: Callable[..., Any]) -> bool:
     kind = function_of(make)
     return not (isinstance(kind, type) and issubclass(kind, Teacher)) or kind.needs_demonstrations
-
-
-def _maker(config: Config, name: str) -> Callable[..., Any]:
-    """The constructor of a part, with its options and the constructors of the parts that it chooses."""
-    part = config.chosen[name]
-    children = {keyword: _maker(config, part.full(keyword)) for keyword in part.choices}
-    given = {**part.set_by(config.values), **children}
-    return partial(part.make, **given) if given else part.make

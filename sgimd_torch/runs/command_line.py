@@ -9,37 +9,15 @@ Examples:
 
 from __future__ import annotations
 
-import inspect
 import shlex
 import sys
-import textwrap
-import types
-import typing
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final, get_type_hints
+from typing import Any
 
-from sgimd_torch.catalogue import WORDS, about
-from sgimd_torch.catalogue.options import help_of
-from sgimd_torch.runs.config import FLAGS, RUN, Config, Part, chosen, dashed, typed
+from sgimd_torch.catalogue.options import Option, read, wanted
+from sgimd_torch.runs.config import FLAGS, RUN, Config, chosen, dashed
 from sgimd_torch.runs.process import Stopping, loading
-
-ALONE: Final = "practice"  # the default learner of a robot without demonstrations
-_PARTS: Final = [kind for kind in WORDS if kind not in ("algorithm", "command")]
-_PLACES: Final = {"progress": "goals.progress", "choose": "teacher.choose"}  # options that choose parts of other parts
-_WIDTH: Final = 120
-_TYPES: Final = {  # names of types in help, longest first
-    "tuple[float, float]": "two numbers with a comma between",
-    "tuple[int, ...]": "whole numbers with commas",
-    "tuple[str, ...]": "names with commas",
-    "pathlib.Path": "a path",
-    "float": "a number",
-    "int": "a whole number",
-    "str": "text",
-    "bool": "true or false",
-    "None": "null",
-    " |": " or",
-}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -67,16 +45,14 @@ def parse(argv: Sequence[str], description: str | None = None) -> tuple[Config, 
     """
     try:
         given, asked = _read(argv)
-        if "help" in asked and not given:
-            print(overview(description))
-            raise SystemExit(0)
-        if "algorithm" not in given:
-            given["algorithm"] = _suited(given)
-        parts = chosen(given["algorithm"], given, asks="teachers" in given)
+        choices = {"algorithm": Config.algorithm, **given}
         if "help" in asked:
-            print(help_on(parts))
+            from sgimd_torch.runs.help import help_on, overview  # imported here, as runs show no help
+
+            print(help_on(chosen(choices)) if given else overview(description))
             raise SystemExit(0)
-        values = _values(given, parts)
+        options = RUN | {name: each for part in chosen(choices).values() for name, each in part.options.items()}
+        values = {name: _typed(name, text, options) for name, text in given.items()}
         own = {name: values.pop(name) for name in RUN if name in values}
         return Config(**own, parts=values), {flag: flag in asked for flag in FLAGS}
     except ValueError as error:
@@ -112,111 +88,13 @@ def _read(argv: Sequence[str]) -> tuple[dict[str, str], set[str]]:
     return given, asked
 
 
-def _suited(given: Mapping[str, str]) -> str:
-    """The default algorithm for a robot: a taught one if there are demonstrations, else one that learns alone."""
-    robot = {name: text for name, text in given.items() if name.partition(".")[0] == "environment"}
-    if not robot or "demonstrations" in given:
-        return Config.algorithm
-    with loading():
-        from sgimd_torch.runs.build import has_demonstrations
-    config = Config(ALONE, parts=_values(robot, chosen(ALONE, robot)))
-    return Config.algorithm if has_demonstrations(config) else ALONE
-
-
-def _values(given: Mapping[str, str], parts: Mapping[str, Part]) -> dict[str, Any]:
-    """The typed values, converted to the types of the options; names of parts and values of unknown options stay text.
+def _typed(name: str, text: str, options: Mapping[str, Option]) -> Any:
+    """A typed value, converted to the type of its option; names of parts and values of unknown options stay text.
 
     Raises:
-        ValueError: a value is of another type.
+        ValueError: the value is of another type.
     """
-    hints, found = get_type_hints(Config), dict[str, Any](given)
-    kinds = {name: hints[name] for name in RUN}
-    kinds |= {part.full(name): option.kind for part in parts.values() for name, option in part.options.items()}
-    for name, text in given.items():
-        if name in kinds and name not in parts:
-            try:
-                found[name] = _value(text, kinds[name])
-            except ValueError as error:
-                raise ValueError(f"--{dashed(name)} must be {_wanted(kinds[name])}, got {text}") from error
-    return found
-
-
-def _value(text: str, kind: Any) -> Any:
-    """``text`` as a value of type ``kind``; a list may be typed with brackets or without.
-
-    Raises:
-        ValueError: the text is of another type.
-    """
-    inner = typing.get_args(kind)
-    if typing.get_origin(kind) is tuple:
-        items = [item.strip() for item in text.removeprefix("[").removesuffix("]").split(",") if item]
-        kinds = [inner[0]] * len(items) if ... in inner else inner
-        return tuple(_value(*each) for each in zip(items, kinds, strict=True))
-    if inner:  # a union, with None last
-        if text == "null" and types.NoneType in inner:
-            return None
-        return _value(text, inner[0])
-    if kind is bool:
-        return bool(("false", "true").index(text))
-    if not text:
-        raise ValueError("nothing was typed")
-    return kind(text)
-
-
-def _wanted(kind: Any) -> str:
-    """Name of a type, for somebody who types a value of this type."""
-    text = inspect.formatannotation(kind)
-    for python, plain in _TYPES.items():
-        text = text.replace(python, plain)
-    return text
-
-
-def overview(description: str | None) -> str:
-    """Text of ``sgimd run --help``: options and flags of every run, and names of parts."""
-    about_run = help_of(Config)
-    shown = {name: typed(getattr(Config, name)) for name in RUN}
-    run = {name: about_run[name] + f" ({text})" * (text != "null") for name, text in shown.items()} | FLAGS
-    rivals = [word for word, at in WORDS["algorithm"].items() if at.startswith("rivals.")]
-    lines = [
-        "usage: sgimd run [--OPTION VALUE ...] [--resume]",
-        "",
-        *(description or "").splitlines(),
-        "",
-        "options of every run, with the default in brackets (no brackets: the default is null, which means no value):",
-        *(_line(f"--{dashed(name)}", text) for name, text in run.items()),
-        "names for --algorithm:",
-        *(_line(word, about("algorithm", word)) for word in WORDS["algorithm"] if word not in rivals),
-        _line("for comparison", f"{', '.join(rivals)}; these need the extra rivals"),
-        "names for the parts of a run; for a part of your own, type package.module:attribute:",
-        *(_line(f"--{_PLACES.get(kind, kind)}", ", ".join(words)) for kind, words in WORDS.items() if kind in _PARTS),
-        "",
-        "Parts have options, too, such as --goals.window 12. To see them, name the algorithm or a part before --help:",
-        "sgimd run --goals interest-map --help",
-    ]
-    return "\n".join(lines)
-
-
-def help_on(parts: Mapping[str, Part]) -> str:
-    """Text of ``sgimd run --goals grid --help``: options of the chosen parts."""
-    lines = [
-        "This screen has the options of the chosen parts; "
-        "sgimd run --help has the options of every run, such as --seed.",
-        "usage: sgimd run [--OPTION VALUE ...] [--resume]",
-        "C: contexts, which the robot sees and cannot choose. Pi: movement parameters, theta.",
-        "T: outcomes; a goal is a point of T. The paper: Nguyen & Oudeyer (2014).",
-    ]
-    for part in parts.values():
-        described = help_of(part.make)
-        what = [about(part.kind, part.word)] if part.word in WORDS[part.kind] else []
-        leads_to = [f"--{part.full(each)}={parts[part.full(each)].word}" for each in part.choices]
-        what += [f"default or chosen parts, each of which can be replaced: {' '.join(leads_to)}"] if leads_to else []
-        lines += ["", textwrap.fill(f"--{part.name or part.kind} {part.word}: {'; '.join(what)}", _WIDTH)]
-        for name, option in part.options.items():
-            said = described.get(name, "").replace("``", "").replace("None", "null")
-            meant = f"{_wanted(option.kind)}; default: {typed(option.default)}"
-            lines.append(_line(f"--{dashed(part.full(name))}", f"{said} ({meant})"))
-    return "\n".join(lines)
-
-
-def _line(name: str, text: str) -> str:
-    return textwrap.fill(text, _WIDTH, initial_indent=f"  {name:17} ", subsequent_indent=" " * 20)
+    try:
+        return read(text, options[name].kind) if name in options else text
+    except ValueError as error:
+        raise ValueError(f"--{dashed(name)} must be {wanted(options[name].kind)}, got {text}") from error

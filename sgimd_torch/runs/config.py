@@ -2,8 +2,8 @@
 
 Defaults are those of the library, so a run with one changed option is an ablation.
     config = Config(algorithm="sagg-riac", parts={"goals": "grid", "goals.window": 12}); config["search.noise"]
-Options of a part are the keywords of its signature (`sgimd_torch.catalogue.options`). A keyword whose default is in the
-catalogue chooses another part.
+Options of a part are the keywords of its signature (`sgimd_torch.catalogue.options`). A keyword that is called like a
+kind of the catalogue, such as ``goals``, chooses another part.
 """
 
 from __future__ import annotations
@@ -11,14 +11,13 @@ from __future__ import annotations
 import importlib.util
 import json
 from collections.abc import Callable, Mapping
-from contextlib import suppress
-from dataclasses import dataclass, fields
-from functools import cache, cached_property, partial
+from dataclasses import dataclass
+from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, Final, Self
+from typing import Any, Final, NamedTuple, Self
 
-from sgimd_torch.catalogue import ROD, TAUGHT_BY, WORDS, did_you_mean, load_word, named, place_of
-from sgimd_torch.catalogue.options import Option, options_of, parameters_of
+from sgimd_torch.catalogue import ROD, TAUGHT_BY, did_you_mean, load_word, place_of, word_of
+from sgimd_torch.catalogue.options import Option, choices_of, options_of
 
 OWN: Final = "own"  # name of the run's own inverse model
 FILES: Final = ("benchmark", "demonstrations")  # options that name a file
@@ -31,6 +30,7 @@ MAY_CHANGE: Final = (
 )
 """Options that may change when a run is resumed, as they do not affect the learner. Files are compared by their
 checksums: the demonstrations must be equal, the benchmark may be another one."""
+OF_TEACHING: Final = ("demonstrations", "teacher", "teachers", "social")  # options of taught algorithms
 ALGORITHM: Final = ""  # name of the part "algorithm" of a run: its options have no prefix
 
 
@@ -39,21 +39,21 @@ class Config:
     """One run.
 
     Args:
-        algorithm: learner, see below; the default is practice for a robot without demonstrations.
+        algorithm: learner, see below.
         seed: random seed; two runs with equal options and an equal seed are equal.
         movements: number of movements, rests included.
-        teachers: names of teachers for an algorithm that asks; null: one teacher with all demonstrations.
+        teachers: names of teachers to ask; null: one with all demonstrations.
         out: folder for runs; a run with seed 3 goes to OUT/NAME/seed-003.
-        name: name of the variant, NAME in the path of the run; null: the name of the algorithm.
+        name: name of the variant, NAME in the path of the run; null: the algorithm.
         board: true to write curves and pictures for TensorBoard into the run's folder.
         evaluate_at: numbers of movements after which to evaluate, besides the end; null: 250, 500 and every 1000; []:
             never, not even at the end.
         evaluated_by: inverse models to evaluate: first own, which is the run's, then names for --inverse.
-        repeats: number of extra executions of each evaluation movement, to measure the noise; 0: no measurement.
-        floor_at: numbers of movements at which the evaluation also measures the noise, which takes four times as long;
-            null: every evaluation.
-        benchmark: file of goals for evaluations; null: the environment's own goals.
-        demonstrations: file of recorded demonstrations; null: the environment's own demonstrations.
+        repeats: number of extra executions of each evaluation movement, for the noise; 0: none.
+        floor_at: numbers of movements at which an evaluation measures the noise, too; null: the end of the run; []:
+            never.
+        benchmark: file of goals for evaluations; null: the environment's own.
+        demonstrations: file of recorded demonstrations; null: the environment's own.
         failures: number of failed movements in a row that stops the run; null: 10.
         parts: parts and their options by name, such as "goals" or "goals.window"; defaults may be left out.
 
@@ -61,7 +61,7 @@ class Config:
         ValueError: a value is out of its range, or a name is unknown.
     """
 
-    algorithm: str = "practice-taught"
+    algorithm: str = "practice"
     seed: int = 0
     movements: int = 5000
     teachers: tuple[str, ...] | None = None
@@ -69,7 +69,7 @@ class Config:
     name: str | None = None
     board: bool = False
     evaluate_at: tuple[int, ...] | None = None
-    evaluated_by: tuple[str, ...] = (OWN, "linear")
+    evaluated_by: tuple[str, ...] = (OWN,)
     repeats: int = 3
     floor_at: tuple[int, ...] | None = None
     benchmark: Path | None = None
@@ -78,7 +78,7 @@ class Config:
     parts: Mapping[str, Any] | tuple[tuple[str, Any], ...] = ()
 
     def __post_init__(self) -> None:
-        given = {name: tuple(value) if isinstance(value, list) else value for name, value in dict(self.parts).items()}
+        given = dict(self.parts)
         for name in given:
             if name not in self.standards:
                 raise self._refused(name)
@@ -104,6 +104,8 @@ class Config:
                 place_of(kind, word)
         if self.teachers is not None and self.teaching != "teachers":
             raise self._refused("teachers")
+        if self.demonstrations is not None and not self.teaching:
+            raise self._refused("demonstrations")
         if self.board and importlib.util.find_spec("tensorboardX") is None:
             raise ValueError("board true needs tensorboardX, which is not installed; pip install 'sgimd-torch[board]'")
         if self.variant in ("", ".", "..") or any(sign in self.variant for sign in "/\\\0"):
@@ -124,27 +126,34 @@ class Config:
     @cached_property
     def chosen(self) -> dict[str, Part]:
         """Parts of the run, by name."""
-        return chosen(self.algorithm, dict(self.parts), asks=self.teachers is not None)
+        return chosen(self._choices)
 
     @property
     def teaching(self) -> str:
         """How the learner is taught: by "teachers" (it asks them), by a "teacher" (who is not asked), or "" (alone)."""
-        return teaching(self.algorithm, dict(self.parts), asks=self.teachers is not None)
+        return teaching(self._choices)
+
+    @property
+    def _choices(self) -> dict[str, Any]:
+        return {"algorithm": self.algorithm, "teachers": self.teachers, **dict(self.parts)}
 
     @cached_property
     def standards(self) -> dict[str, Any]:
         """Defaults of every part and every option of a part, by name."""
-        found: dict[str, Any] = {}
-        for name, part in self.chosen.items():
-            if name != ALGORITHM:
-                found[name] = part.standard
-            found |= {part.full(each): option.default for each, option in part.options.items()}
-        return found
+        found = {name: part.standard for name, part in self.chosen.items() if name != ALGORITHM}
+        return found | {name: each.default for part in self.chosen.values() for name, each in part.options.items()}
 
     @cached_property
     def values(self) -> dict[str, Any]:
         """Values of every part and every option of a part, by name."""
         return {**self.standards, **dict(self.parts)}
+
+    def constructor(self, name: str) -> Callable[..., Any]:
+        """The constructor of a part, with its options and the constructors of the parts that it chooses."""
+        part = self.chosen[name]
+        given = {each: self.values[each] for each in part.options}
+        given |= {each: self.constructor(each) for each in part.choices}
+        return partial(part.make, **{each.rpartition(".")[2]: value for each, value in given.items()})
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -158,11 +167,10 @@ class Config:
         Raises:
             ValueError: a value is out of its range, or an option does not exist.
         """
-        own: dict[str, Any] = {
-            name: tuple(value) if isinstance(value, list) else value for name, value in settings.items()
-        }
+        own = dict(settings)
+        own |= {name: tuple(value) for name, value in own.items() if isinstance(value, list)}
         own |= {name: Path(own[name]) for name in ("out", *FILES) if own.get(name) is not None}
-        parts = {name: value for name, value in own.items() if name not in RUN and not name.endswith("_crc32")}
+        parts = {name: value for name, value in own.items() if name not in RUN}
         return cls(**{name: own[name] for name in RUN if name in own}, parts=parts)
 
     @property
@@ -189,22 +197,25 @@ class Config:
         wanted = standard if self.evaluate_at is None else self.evaluate_at
         return sorted({movements for movements in wanted if movements < self.movements} | {self.movements})
 
+    @property
+    def floors(self) -> tuple[int, ...]:
+        """Numbers of movements at which an evaluation measures the noise."""
+        return (self.movements,) if self.floor_at is None else self.floor_at
+
     def _refused(self, name: str) -> ValueError:
-        """The error for an option that this run does not have; the message names parts that have it."""
-        owner, _, last = name.rpartition(".")
-        if owner not in self.chosen:  # the part with this option does not belong to this run, either
-            head = owner.partition(".")[0]
-            owner, last = ALGORITHM, head if any(_with(kind, head) for kind in WORDS) else last
-        part, having = self.chosen[owner], []
-        for kind in (part.kind,) if owner != ALGORITHM or _with(part.kind, last) else WORDS:
-            if words := ", ".join(_with(kind, last)):
-                having.append(f"{kind} {words}" + (f" (--{kind}.{last})" if kind != part.kind else ""))
-        near = [each for each in (*self.standards, *RUN, *FLAGS) if each.rpartition(".")[0] == owner]
-        more = f"; {' and '.join(having)} have it" if having else dashed(did_you_mean(name, near, 2))
-        return ValueError(f"--{dashed(name)}: {part.kind} {part.word} has no such option{more}")
+        """The error for an option that this run does not have."""
+        owner = name.rpartition(".")[0]
+        part = self.chosen.get(owner, self.chosen[ALGORITHM])
+        if name.partition(".")[0] in OF_TEACHING and not self.teaching:
+            why = f"learns alone; taught are {', '.join(TAUGHT_BY)}"
+        else:
+            known = {*self.standards, *RUN, *FLAGS} - {name}
+            near = did_you_mean(name, [each for each in sorted(known) if each.rpartition(".")[0] == owner], 2)
+            why = f"has no such option{dashed(near)}"
+        return ValueError(f"--{dashed(name)}: {part.kind} {part.word} {why}")
 
 
-RUN: Final = tuple(each.name for each in fields(Config) if each.name != "parts")
+RUN: Final = options_of(Config)
 """Options of every run."""
 FLAGS: Final = {
     "resume": "flag: go on with a stopped or killed run, or lengthen a finished one.",
@@ -212,110 +223,64 @@ FLAGS: Final = {
 }
 
 
-@dataclass(frozen=True)
-class Part:
+class Part(NamedTuple):
     """A part of a run.
 
-    Args:
-        name: name of the part in the run, such as "goals" or "goals.progress".
-        kind: kind of the part, such as "goals" or "progress".
+    Attributes:
+        kind: kind of the part, such as "progress".
         word: name of the chosen part in the catalogue.
         standard: name of the default part in the catalogue.
-        make: constructor, with the keywords that the name in the catalogue fixes.
-        options: keywords that a run can set.
-        choices: keywords that choose other parts, with the kind and the default of each.
+        make: constructor.
+        options: keywords that a run can set, by name in the run, such as "goals.progress.window".
+        choices: constructors of the default parts that it chooses, by name in the run, such as "goals.progress".
     """
 
-    name: str
     kind: str
     word: str
     standard: str
     make: Callable[..., Any]
     options: Mapping[str, Option]
-    choices: Mapping[str, tuple[str, Callable[..., Any]]]
-
-    def full(self, keyword: str) -> str:
-        """Name of a keyword in the run."""
-        return f"{self.name}.{keyword}" if self.name else keyword
-
-    def set_by(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Options of this part, from the ``values`` of a run."""
-        return {each: values[self.full(each)] for each in self.options}
+    choices: Mapping[str, Callable[..., Any]]
 
 
-def part_of(name: str, kind: str, word: str, default: Callable[..., Any] | str = "") -> Part:
-    """The part that ``word`` names.
+def teaching(given: Mapping[str, Any]) -> str:
+    """How a learner is taught: as the catalogue says, or, for a user's own learner, by whoever was given."""
+    if ":" in given["algorithm"]:
+        return "teachers" if given.get("teachers") else "teacher" if "teacher" in given else ""
+    by = TAUGHT_BY.get(given["algorithm"], "")
+    return by if by in ("", "teachers") else "teacher"
+
+
+def chosen(given: Mapping[str, Any]) -> dict[str, Part]:
+    """Parts of a run by name: environment, algorithm, teacher, and the parts that these choose.
 
     Args:
-        name: name of the part in the run.
-        kind: kind of the part.
-        word: name in the catalogue, or package.module:attribute; "": the default part.
-        default: name of the default part, or its constructor, which may fix options.
+        given: choices by name, such as "algorithm" or "goals"; other names are ignored.
 
     Raises:
         ValueError: there is no such part, or a package that it needs is not installed.
     """
-    found = named(default) if callable(default) else None
-    standard = found[1] if found else default if isinstance(default, str) else ""
-    word = word or standard
-    return (_read if ":" in word else _READ)(name, kind, word, standard, default)  # no cache for a user's file
-
-
-def _read(name: str, kind: str, word: str, standard: str, default: Callable[..., Any] | str) -> Part:
-    own = callable(default) and word == standard
-    make = default if callable(default) and own else load_word(kind, word)
-    fixed = make.keywords if isinstance(make, partial) and not own else {}  # keywords that its name fixes
-    free = {each: known.default for each, known in parameters_of(make).items() if each not in fixed}
-    options = {each: known for each, known in options_of(make).items() if each in free}
-    leads_to = {each: (named(value), value) for each, value in free.items() if each not in options and callable(value)}
-    choices = {each: (found[0], value) for each, (found, value) in leads_to.items() if found}
-    return Part(name, kind, word, standard or word, make, options, choices)
-
-
-_READ: Final = cache(_read)
-
-
-def teaching(algorithm: str, given: Mapping[str, Any], *, asks: bool) -> str:
-    """How a learner is taught: as the catalogue says, or, for a user's own learner, by whoever was given."""
-    if ":" in algorithm:
-        return "teachers" if asks else "teacher" if "teacher" in given else ""
-    by = TAUGHT_BY.get(algorithm, "")
-    return "teacher" if by not in ("", "teachers") else by
-
-
-def chosen(algorithm: str, given: Mapping[str, Any], *, asks: bool = False) -> dict[str, Part]:
-    """Parts of a run by name: environment, algorithm, and the parts that these choose.
-
-    Args:
-        algorithm: name of the learner.
-        given: choices by name; other names are ignored.
-        asks: whether the run has teachers to ask.
-
-    Raises:
-        ValueError: see ``part_of``.
-    """
     found: dict[str, Part] = {}
 
     def take(name: str, kind: str, default: Callable[..., Any] | str) -> None:
-        part = found[name] = part_of(name, kind, given.get(name, ""), default)
-        for keyword, (child, value) in part.choices.items():
-            take(part.full(keyword), child, value)
+        standard = word_of(kind, default) if callable(default) else default
+        word = given.get(name) or standard
+        if callable(default) and word == standard:
+            make, fixed = default, dict[str, Any]()
+        else:
+            make = load_word(kind, word)
+            fixed = make.keywords if isinstance(make, partial) else {}  # keywords that the word fixes
+        prefix = f"{name}." if name else ""
+        options = {prefix + each: option for each, option in options_of(make).items() if each not in fixed}
+        choices = {prefix + each: value for each, value in choices_of(make).items() if each not in fixed}
+        found[name] = Part(kind, word, standard, make, options, choices)
+        for each, value in choices.items():
+            take(each, each.removeprefix(prefix), value)
 
     take("environment", "environment", ROD)
-    take(ALGORITHM, "algorithm", algorithm)
-    if teaching(algorithm, given, asks=asks) == "teacher":
-        take("teacher", "teacher", TAUGHT_BY.get(algorithm, "periodic"))
-    return found
-
-
-def _with(kind: str, name: str) -> list[str]:
-    """Names of the parts of a kind that have an option or a choice with this ``name``."""
-    found = []
-    for word in WORDS.get(kind, {}) if kind != "command" else ():
-        with suppress(ValueError):  # parts that are not installed are left out
-            part = part_of(ALGORITHM, kind, word)
-            if name in (*part.options, *part.choices, teaching(word, {}, asks=False) if kind == "algorithm" else ""):
-                found.append(word)
+    take(ALGORITHM, "algorithm", given["algorithm"])
+    if teaching(given) == "teacher":
+        take("teacher", "teacher", TAUGHT_BY.get(given["algorithm"], "periodic"))
     return found
 
 
@@ -328,11 +293,9 @@ def code_of(settings: Mapping[str, Any]) -> list[str]:
 
 def words(config: Config) -> list[str]:
     """Arguments of ``sgimd run`` for a run: ``--dashed-name=value`` for the algorithm and each changed option."""
-    standard = {each.name: each.default for each in fields(Config)}
-    own = [
-        (name, getattr(config, name)) for name in RUN if getattr(config, name) != standard[name] or name == "algorithm"
-    ]
-    return [f"--{dashed(name)}={typed(value)}" for name, value in (*own, *dict(config.parts).items())]
+    own = {name: getattr(config, name) for name in RUN}
+    own = {name: value for name, value in own.items() if value != RUN[name].default or name == "algorithm"}
+    return [f"--{dashed(name)}={typed(value)}" for name, value in {**own, **dict(config.parts)}.items()]
 
 
 def dashed(name: str) -> str:

@@ -114,7 +114,9 @@ def _salvaged(path: Path, damage: str, accept_loss: bool, notes: list[str]) -> R
 def _forget_evaluations(record: Record, config: Config, *, anew: bool, notes: list[str]) -> None:
     """Drop evaluations that are not requested, and all after the first missing one; with ``anew``, drop all."""
     made = list(dict.fromkeys(movements for movements, *_ in record.rows("evaluations")))
-    wanted = [movements for movements in made if movements in config.evaluations and not anew]
+    ended = record.about["settings"]["movements"]  # if this run ends later, the noise is not measured here
+    longer = config.floor_at is None and ended != config.movements
+    wanted = [each for each in made if each in config.evaluations and not anew and not (longer and each == ended)]
     pairs = takewhile(lambda pair: pair[0] == pair[1], zip(wanted, config.evaluations, strict=False))
     kept = [movements for movements, _ in pairs]
     if others := [str(movements) for movements in made if movements not in kept]:

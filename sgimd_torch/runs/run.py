@@ -15,8 +15,7 @@ from typing import Final, Protocol, Self
 
 from sgimd_torch.environments.protocol import FAILURES, SimulationError
 from sgimd_torch.evaluation import Evaluation
-from sgimd_torch.record import RunError
-from sgimd_torch.record.replay import ReplayError
+from sgimd_torch.record import ReplayError, RunError
 from sgimd_torch.runs.build import RunParts
 from sgimd_torch.runs.directory import open_run
 from sgimd_torch.runs.evaluations import Evaluations

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator
-from functools import partial
 
 import numpy as np
 
@@ -88,13 +87,6 @@ class NelderMead(Search):
     def _place(self, theta: Array) -> Array:
         policies, noise = self.problem.policies, self.noise
         return policies.clip(self.rng.normal(theta, noise * policies.sides) if noise else theta)
-
-
-exact = partial(NelderMead, noise=0.0)
-"""Nelder-Mead simplex around remembered movements, without noise."""
-
-complete = partial(NelderMead, noise=0.0, complete=True, xatol=1e-4, fatol=1e-4)
-"""Nelder-Mead simplex without noise, with theta_dim + 1 vertices (26 for the rod), as in the paper."""
 
 
 def simplex_descent(

@@ -21,7 +21,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from sgimd_torch.record.replay import ReplayError
+from sgimd_torch.record import ReplayError
 from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.process import Failed, loading, parser_of, say
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from viser import ViserServer
 
 NAME: Final = "taught"  # name of a new run
+LEARNER: Final = "practice-taught"  # its algorithm, unless another one is chosen
 WHERE: Final = """
 Teach it here:  http://127.0.0.1:{port}/?token={token}   (Ctrl-C ends the session; {path} keeps everything)
 From another machine:  ssh -L {port}:127.0.0.1:{port} THIS-MACHINE   and open the address above on that machine.
@@ -107,7 +108,7 @@ def options_of(argv: Sequence[str]) -> tuple[Config, int]:
         if config.directory.resolve() != path.resolve():
             raise ValueError(f"{path} must be called {config.directory.name}, as sgimd run calls it; was it renamed?")
         return config, options.port
-    words = [f"--name={NAME}", "--repeats=0", *words]
+    words = [f"--name={NAME}", f"--algorithm={LEARNER}", "--repeats=0", *words]
     config, _ = parse(words)
     if "teacher" in config:
         config, _ = parse([f"--teacher={BY_HAND}", *words])

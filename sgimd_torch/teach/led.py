@@ -15,7 +15,8 @@ import numpy as np
 
 from sgimd_torch.environments.fishing_rod import JOINT_RANGES, JOINTS, FishingRod
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.runs.tasks import Task, correspondence_of
+from sgimd_torch.runs.tasks import Task
+from sgimd_torch.runs.tasks.taught import correspondence_of
 from sgimd_torch.spaces import Array, Box
 
 

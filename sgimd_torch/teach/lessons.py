@@ -16,7 +16,8 @@ import numpy as np
 
 from sgimd_torch.demonstrations.fit import beyond_limits, misfit_of
 from sgimd_torch.environments.protocol import primitive_of
-from sgimd_torch.runs.tasks import Task, correspondence_of
+from sgimd_torch.runs.tasks import Task
+from sgimd_torch.runs.tasks.taught import correspondence_of
 from sgimd_torch.spaces import Array, Demonstration, read_only
 from sgimd_torch.teach.led import HandLed, hand_led_of
 

@@ -33,7 +33,8 @@ from sgimd_torch.environments.protocol import Environment, execute_many
 from sgimd_torch.runs.build import task_of
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.process import parser_of
-from sgimd_torch.runs.tasks import Task, benchmark_of, demonstrations_of
+from sgimd_torch.runs.tasks import Task, benchmark_of
+from sgimd_torch.runs.tasks.taught import demonstrations_of
 from sgimd_torch.spaces import check_count, stream
 from sgimd_torch.views.demonstrations import check
 

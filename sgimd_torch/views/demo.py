@@ -23,7 +23,6 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Final
 
@@ -88,12 +87,11 @@ def configs_of(rest: Sequence[str]) -> dict[str, Config]:
     for name in ("algorithm", "name", "environment"):
         if name in given:
             raise ValueError(f"--{name} cannot be given here: the demo shows its own learners on the fishing rod")
-    words = ["--out=runs/demo", "--evaluated-by=own", "--evaluate-at=250,1000,2000", f"--environment={ROD}", *rest]
+    words = ["--out=runs/demo", "--evaluate-at=250,1000,2000", f"--environment={ROD}", *rest]
     configs = {algorithm: parse([*words, f"--algorithm={algorithm}"])[0] for algorithm in LEARNERS}
     if not configs["sgim-d"].evaluations:
         raise ValueError("--evaluate-at [] leaves nothing to draw; choose some movements, or omit it")
-    # The noise floor is measured only at the end, because measuring takes longer than everything else.
-    return {name: replace(config, floor_at=(config.movements,)) for name, config in configs.items()}
+    return configs
 
 
 def parser() -> argparse.ArgumentParser:

@@ -36,7 +36,8 @@ from sgimd_torch.environments.protocol import SimulationError, execute_many
 from sgimd_torch.runs.build import task_of
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.process import parser_of
-from sgimd_torch.runs.tasks import Task, correspondence_of
+from sgimd_torch.runs.tasks import Task
+from sgimd_torch.runs.tasks.taught import correspondence_of
 from sgimd_torch.spaces import Array, Demonstration, stream
 from sgimd_torch.views.text_table import print_table
 

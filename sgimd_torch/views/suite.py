@@ -75,7 +75,6 @@ DEFAULTS: Final = {
     "algorithm": "practice",
     "movements": "1000",
     "repeats": "0",
-    "evaluated-by": "own",
     "out": "runs/suite",
 }
 OWN: Final = ("environment", "benchmark", "demonstrations", "name")  # options that a task decides

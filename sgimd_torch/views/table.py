@@ -5,8 +5,7 @@ after --at movements; the default is the last number of movements at which all f
 without this evaluation are left out, and named below the table. The worst variant comes first.
 
 Errors and noise floors are means over seeds, in the unit of T. With 5 seeds or more, the number after ± is the standard
-deviation of the errors over seeds. In the column "by linear" the inverse model LocallyLinear answers for all variants.
-Times are milliseconds per movement.
+deviation of the errors over seeds. Times are milliseconds per movement.
 
 --baseline adds a column: the interquartile mean of the differences error minus error of the baseline, at common seeds.
 With 5 seeds or more, the brackets have its 95 % bootstrap interval. A number below 0 is better than the baseline.
@@ -64,7 +63,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if not variants:
         raise RunError("\n".join(["there is nothing to compare; is --at a number that was evaluated?", *left_out]))
     unit = unit_of(variants)
-    errors = (f"error at {EARLY}", unit(f"at {at}"), "by linear", "noise floor")
+    errors = (f"error at {EARLY}", unit(f"at {at}"), "noise floor")
     table: list[tuple[str, ...]] = [
         ("variant", "seeds", *errors, "physics (ms)", "learning (ms)"),
         *map(_row, variants),
@@ -104,7 +103,6 @@ def _row(variant: Variant) -> tuple[str, ...]:
         str(len(errors)),
         _mean(variant.values(EARLY)),
         _mean(errors) + ("" if variant.few else f" ± {errors.std(ddof=1):.3f}"),
-        _mean(variant.values(variant.last, answer="linear")),
         _mean(variant.values(variant.last, "noise_floor")),
         *(f"{milliseconds * variant.seconds(part):.2f}" for part in ("physics", "learner")),
     )

@@ -78,13 +78,13 @@ class Variant:
         self.evaluated: NDArray[np.int64] = reduce(np.intersect1d, moments or [np.empty(0)]).astype(np.int64)
         self.last = at or (int(self.evaluated[-1]) if len(self.evaluated) else 0)  # number of movements
 
-    def values(self, movements: int, column: str = "mean_error", answer: str = "own") -> Array:
+    def values(self, movements: int, column: str = "mean_error") -> Array:
         """``(n_seeds,)`` values of a column of the evaluations after ``movements`` movements; NaN: no evaluation."""
-        return np.array([run.at(movements, column, answer) for run in self.used], dtype=np.float64)
+        return np.array([run.at(movements, column) for run in self.used], dtype=np.float64)
 
-    def at(self, movements: int, column: str = "mean_error", answer: str = "own") -> Interval | None:
+    def at(self, movements: int, column: str = "mean_error") -> Interval | None:
         """Interquartile mean of ``values`` with its interval; None if a value is missing."""
-        return over_seeds(self.values(movements, column, answer))
+        return over_seeds(self.values(movements, column))
 
     @property
     def few(self) -> bool:

@@ -11,8 +11,8 @@ from sgimd_torch.asking.teachers import AnsweringTeacher, high_half, low_half, m
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.learner.requests import Demonstrator
 from sgimd_torch.parts import Strategy
+from sgimd_torch.record import ReplayError
 from sgimd_torch.record.lives import load_life, save_life
-from sgimd_torch.record.replay import ReplayError
 from sgimd_torch.runs.tasks.robots import arm_demonstrations
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Demonstration, Lesson, Request, stream

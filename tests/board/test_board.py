@@ -172,6 +172,7 @@ def test_the_curves_of_a_run_are_those_of_its_record(watched):
     curves, read = curves_of(watched), read_run(watched)
     for tag, column in {"mean": "mean_error", "p90": "p90_error", "noise_floor": "noise_floor"}.items():
         expected = dict(zip(read.evaluation["movements"], read.evaluation[column], strict=True))
+        expected = {step: value for step, value in expected.items() if np.isfinite(value)}  # the floor: at the end only
         assert curves[f"error/{tag}"] == pytest.approx(expected, rel=1e-6)
     first = read.origin[:50]
     for origin in np.unique(first):
@@ -188,7 +189,7 @@ def test_the_curves_of_a_run_are_those_of_its_record(watched):
 def test_other_readers_find_every_curve(watched):
     found = pytest.importorskip("tbparse").SummaryReader(str(watched)).scalars
     assert set(found.tag) == curves_of(watched).keys()
-    assert {"error/mean", "error/by_linear", "goals/met", "competence/R"} < set(found.tag)
+    assert {"error/mean", "goals/met", "competence/R"} < set(found.tag)
 
 
 def test_every_tag_is_explained_in_the_file_with_its_unit_and_in_the_legend(watched):

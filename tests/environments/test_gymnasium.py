@@ -16,7 +16,8 @@ from sgimd_torch.environments.swimmer import Swimmer
 from sgimd_torch.environments.to_gymnasium import ToGymnasium
 from sgimd_torch.runs.build import task_of
 from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.tasks import benchmark_of, demonstrations_of
+from sgimd_torch.runs.tasks import benchmark_of
+from sgimd_torch.runs.tasks.taught import demonstrations_of
 from sgimd_torch.spaces import Box, stream
 
 PUSHES = Box.cube(-1, 1, 2)

@@ -12,9 +12,8 @@ from sgimd_torch.evaluation import evaluate
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner.events import Kind
 from sgimd_torch.memory import Memory
-from sgimd_torch.record import Record, RunError
+from sgimd_torch.record import Record, ReplayError, RunError
 from sgimd_torch.record.lives import load_life, save_life
-from sgimd_torch.record.replay import ReplayError
 from sgimd_torch.rivals.alp_gmm import AlpGmm
 from sgimd_torch.rivals.cma_es import CmaEs
 from sgimd_torch.rivals.quality_diversity import cma_mae, cma_me, isoline, map_elites

@@ -128,12 +128,12 @@ class Alien:
     [
         (Halfway, "Halfway has no add, which every Goals must have"),
         (partial(Goals), "Goals has no add, sample, which every Goals must have"),
-        ("grid", "must be a class or a function, got 'grid'; from sgimd_torch.goals.progress_grid import ProgressGrid"),
+        ("grid", "must be a class or a function, got 'grid'; import ProgressGrid"),
         ("gird", "unknown goals 'gird'; did you mean grid?"),
         (UniformGoals(problem()), "must be a class or a function, got a finished UniformGoals"),
         (Unasked, "Goals Unasked cannot be called with the arguments of its kind: too many positional arguments"),
-        (NelderMead, "NelderMead must derive from Goals"),
-        (Alien, "Alien must derive from Goals"),
+        (NelderMead, "NelderMead must make a Goals, made a NelderMead; derive a class from Goals of sgimd_torch.parts"),
+        (Alien, "Alien must make a Goals, made a Alien"),
     ],
 )
 def test_what_is_no_constructor_of_its_kind_is_refused_when_it_is_built(make, message):

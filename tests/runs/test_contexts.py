@@ -11,7 +11,7 @@ from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.runs.tasks import demonstrations_of
+from sgimd_torch.runs.tasks.taught import demonstrations_of
 
 
 def test_the_rod_in_the_wind_is_a_task():
@@ -43,4 +43,4 @@ def test_the_rod_in_the_wind_is_run_taught_and_resumed(tmp_path, benchmark):
     assert run.contexts.shape == (45, 1)
     assert np.abs(run.contexts).max() <= 0.05
     assert (run.demonstration >= 0).any()
-    assert len(run.errors["context_0"]) == 2 * 2 * 3  # evaluations, answers, goals
+    assert len(run.errors["context_0"]) == 2 * 3  # evaluations, goals

@@ -122,10 +122,12 @@ def test_a_run_made_longer_executes_nothing_again_for_its_evaluations(tmp_path, 
     assert content_of(tmp_path / "sgim-d" / "seed-003") == reference
 
 
-def test_a_finished_run_made_longer_equals_a_long_run(tmp_path, go):
-    options = ("--algorithm", "observation")
+@pytest.mark.parametrize(("algorithm", "end"), [("observation", 50), ("sgim-d", 60)])
+def test_a_finished_run_made_longer_equals_a_long_run(tmp_path, go, algorithm, end):
+    """The long run is not evaluated after 50 movements; after 60 it is, but the noise is not measured there."""
+    options = ("--algorithm", algorithm)
     assert go(tmp_path / "long", *options) == 0
-    assert go(tmp_path / "extended", *options, "--movements", 50) == 0  # evaluated after 50, which the long one is not
+    assert go(tmp_path / "extended", *options, "--movements", end) == 0
     assert go(tmp_path / "extended", *options, "--resume") == 0
     extended = tmp_path / "extended/observation/seed-003"
     assert content_of(extended) == content_of(tmp_path / "long/observation/seed-003")
@@ -161,8 +163,8 @@ def test_a_resumed_run_keeps_its_evaluations_until_floor_at_changes(tmp_path, go
     assert len(evaluated) == 3
     assert go(tmp_path, "--resume", "--floor_at", "90") == 0
     assert evaluated[3:] == [(30, 0), (60, 0), (90, 2)]
-    assert go(tmp_path, "--resume") == 0  # null: all of them
-    assert evaluated[6:] == [(30, 2), (60, 2), (90, 2)]
+    assert go(tmp_path, "--resume") == 0  # null: only the end
+    assert evaluated[6:] == [(30, 0), (60, 0), (90, 2)]
     assert content_of(tmp_path / "sgim-d" / "seed-003") == reference
 
 

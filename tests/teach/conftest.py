@@ -59,7 +59,7 @@ def open_tab(browser):
 @pytest.fixture
 def rod(tmp_path):
     """A served run on the fishing rod after its first movements."""
-    given = {"teacher": "by-hand", "movements": 400, "evaluate_at": ()}
+    given = {"algorithm": "practice-taught", "teacher": "by-hand", "movements": 400, "evaluate_at": ()}
     taught = TaughtRun(Config.from_settings({**given, "name": "taught", "out": tmp_path, "repeats": 0}))
     taught.go_on(5)
     with served(taught) as page:

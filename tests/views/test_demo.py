@@ -73,7 +73,7 @@ def test_a_second_start_uses_what_is_there_and_fewer_movements_are_refused(shown
 def test_options_of_a_run_are_those_of_all_three():
     configs = configs_of(["--seed", "4", "--movements=70", "--environment.noise", "0"])
     assert [*configs] == [*LEARNERS]
-    assert {(config.seed, config["environment.noise"], config.floor_at) for config in configs.values()} == {
+    assert {(config.seed, config["environment.noise"], config.floors) for config in configs.values()} == {
         (4, 0.0, (70,))
     }
     assert {config.out for config in configs_of([]).values()} == {Path("runs/demo")}

@@ -113,7 +113,6 @@ def test_the_numbers_of_a_run_are_those_of_its_evaluations(pages, run):
     assert "60 of 60 movements on fishing-rod" in pages["one"]
     errors = dict(zip(*rows_of(pages["one"], "Errors"), strict=True))
     assert errors["last error (m)"] == f"{mean:.3f}"
-    assert errors["by linear"] == f"{run.at(60, answer='linear'):.3f}"
     assert errors["noise floor"] == f"{floor:.3f}"
     assert errors["physics (s)"] == f"{run.summary['seconds_physics']:.1f}"
 
