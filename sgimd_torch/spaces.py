@@ -129,6 +129,10 @@ def _in_short(value: object) -> str:
     return " ".join(reprlib.repr(value).split())
 
 
+ROUNDING: Final = 1e-6
+"""Largest difference of two points that counts as rounding, relative to the sides of their box."""
+
+
 @dataclass(frozen=True, eq=False)
 class Box:
     """An axis-aligned box: C, Pi or T. The number of dimensions may be 0, as for C of the fishing task.
@@ -203,6 +207,13 @@ class Box:
         """``(...)``, whether each of the points ``(..., dim)`` lies inside, the border included."""
         points = np.asarray(points, dtype=np.float64)
         return np.logical_and.reduce((points >= self.low) & (points <= self.high), axis=-1)
+
+    def same(self, points: ArrayLike, point: ArrayLike) -> NDArray[np.bool_]:
+        """``(...)``, whether each of ``points`` ``(..., dim)`` equals ``point`` ``(dim,)`` but for rounding.
+
+        Rounding is at most a millionth of each side: other processors and versions compute answers alike to this bound.
+        """
+        return np.asarray((np.abs(np.subtract(points, point)) <= ROUNDING * self.sides).all(axis=-1))
 
     def check(self, name: str, points: ArrayLike, hint: str = "") -> Array:
         """``points`` as float64 ``(..., dim)``, all inside.

@@ -56,7 +56,7 @@ class Returning(Explore):
             return self._widening(context)
         if len(self.problem.memory) > self._seen:  # several robots may move at once
             for theta in self._varied:
-                self.width.update(bool((acted.thetas == theta).all(axis=1).any()))
+                self.width.update(bool(policies.same(acted.thetas, theta).any()))
             self._varied, self._seen = [], len(self.problem.memory)
         if not len(acted) or self.rng.random() < _ANYWHERE:
             return policies.sample(self.rng)

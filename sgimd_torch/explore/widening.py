@@ -69,7 +69,5 @@ class Widening(Explore):
         self._expected = []
         variance = memory.outcomes[:: 1 + len(memory) // _LOOKED_AT].var(axis=0).sum()
         for theta, outcome in expected:
-            for row in new:
-                if np.array_equal(memory.thetas[row], theta):
-                    error = ((memory.outcomes[row] - outcome) ** 2).sum()
-                    self.width.update(bool(error <= _WELL * variance))
+            for row in new.start + np.flatnonzero(self.problem.policies.same(memory.thetas[new.start :], theta)):
+                self.width.update(bool(((memory.outcomes[row] - outcome) ** 2).sum() <= _WELL * variance))

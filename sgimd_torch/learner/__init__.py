@@ -13,6 +13,7 @@ place k of the learner, where its attempts go on. All robots share one memory, o
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -243,6 +244,13 @@ class Learner:
         self._asked = []
         for (place, move), outcome in zip(pairs, told, strict=True):
             self._tell(place, move, outcome)
+
+    def amend(self, theta: Array, *, place: int = 0) -> None:
+        """Replace the movement that is asked for at ``place`` by the recorded ``theta``, which equals it but for
+        rounding. Only a replay does this: the memory then holds what was executed."""
+        here, move = self._asked[place]
+        assert isinstance(move, Move)
+        self._asked[place] = here, replace(move, theta=theta)
 
     def watch(self, demonstration: Demonstration, *, who: str | None = None, place: int = 0) -> None:
         """Watch a demonstration. A requested demonstration goes to the attempt that requested it. Any other

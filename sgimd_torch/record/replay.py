@@ -7,6 +7,7 @@ attempt. So `sgimd_torch.record` has to keep nothing but events.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Generator, Iterable, Iterator
 from typing import Final
 
@@ -16,9 +17,13 @@ from sgimd_torch.learner import Learner
 from sgimd_torch.learner.events import TEACHER, BeforeMovement, Event, Kind
 from sgimd_torch.parts import Teacher
 from sgimd_torch.record.layout import ReplayError
-from sgimd_torch.spaces import Array, Demonstration, Episode, Failure, Request
+from sgimd_torch.spaces import Array, Box, Demonstration, Episode, Failure, Move, Request
 
 _HINT: Final = "was it recorded by another version, on another processor or with another configuration?"
+_ROUNDED: Final = (
+    "movement {} was recorded with a theta that differs by rounding: another version or processor made the record. The "
+    "run goes on from what was executed"
+)
 
 
 def replay(
@@ -40,8 +45,10 @@ def replay(
         Demonstration, request and reply of each robot after its last episode, by its place.
 
     Raises (when iterated):
-        ReplayError: the learner proposes another movement than the recorded one, or the teacher offers another one.
+        ReplayError: the learner proposes another movement than the recorded one, or the teacher offers another one. If
+            a theta differs by rounding, see `Box.same`, there is one `RuntimeWarning`, and the recorded theta counts.
     """
+    rounded = False
     offered: dict[int, Demonstration | None] = {}  # by number of the movement
     asked_until = 0  # number of the first movement before which the teacher was not asked so far
     before: dict[int, BeforeMovement] = {}
@@ -85,10 +92,12 @@ def replay(
                     contexts[each.place] = None if _unseen(each) else each.context
                 moves = learner.ask_many(contexts)
                 for each in group:
-                    number, move = index + each.place, moves[each.place]
-                    _check_repeats(number, "theta", each.theta, None if move is None else move.theta)
-                    if each.goal is not None:
-                        _check_repeats(number, "goal", each.goal, None if move is None else move.goal)
+                    if _check_move(learner, each, index + each.place, moves[each.place]):
+                        assert each.theta is not None
+                        learner.amend(each.theta, place=each.place)
+                        if not rounded:
+                            warnings.warn(_ROUNDED.format(index + each.place), RuntimeWarning, stacklevel=2)
+                        rounded = True
                 if event.kind == Kind.INTERRUPTED:
                     learner.interrupt()
                     asked_until = index  # the resumed run asked its teacher once more
@@ -134,19 +143,32 @@ def _told(event: Event) -> Array | Failure | None:
     return Failure(event.reply or "") if event.kind == Kind.FAILED else event.outcome
 
 
-def _check_repeats(index: int, name: str, recorded: Array | None, now: Array | None) -> None:
-    """Refuse a learner that proposes another vector than the recorded one; None means a rest."""
-    if recorded is None or now is None:
-        if recorded is now:
-            return
-        was, is_now = ("rest", "moves") if recorded is None else ("a movement", "rests")
-        raise ReplayError(f"movement {index} was recorded as {was}, the learner now {is_now}; {_HINT}")
-    differ = np.flatnonzero(recorded != now)
-    if differ.size:
-        k = differ[0]
+def _check_move(learner: Learner, event: Event, index: int, move: Move | None) -> bool:
+    """Refuse a learner that proposes another movement than the recorded one.
+
+    Returns:
+        Whether the thetas differ by rounding.
+    """
+    if move is None or event.theta is None:
+        if move is not None or event.theta is not None:
+            was, now = ("rest", "moves") if event.theta is None else ("a movement", "rests")
+            raise ReplayError(f"movement {index} was recorded as {was}, the learner now {now}; {_HINT}")
+        return False
+    problem = learner.problem
+    if event.goal is not None:
+        _check_repeats(problem.outcomes, index, "goal", event.goal, move.goal)
+    _check_repeats(problem.policies, index, "theta", event.theta, move.theta)
+    return not np.array_equal(event.theta, move.theta)
+
+
+def _check_repeats(box: Box, index: int, name: str, recorded: Array, now: Array | None) -> None:
+    if now is None:
+        raise ReplayError(f"movement {index} was recorded with a {name}, the learner now has none; {_HINT}")
+    if not box.same(recorded, now):
+        k = int(np.argmax(np.abs(recorded - now) / box.sides))
         raise ReplayError(
             f"movement {index} was recorded with another {name}: {name}_{k} was {recorded[k]}, now {now[k]}; "
-            f"{differ.size} of {now.size} entries differ; {_HINT}"
+            f"{np.count_nonzero(recorded != now)} of {now.size} entries differ; {_HINT}"
         )
 
 

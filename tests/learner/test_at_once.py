@@ -230,3 +230,22 @@ def test_too_many_failures_end_the_run_after_the_whole_group():
     with pytest.raises(NoOutcomeError, match="3 movements in a row failed, the last one: ConnectionError: unplugged"):
         episodes.extend(run(learner, robot, 0, movements=40, at_once=4, failures=3))
     assert learner.movements == 4
+
+
+@pytest.mark.parametrize("at_once", [1, 3])
+@pytest.mark.parametrize("name", ["sgim-d", "practice", "practice-taught"])
+def test_a_record_that_differs_by_rounding_goes_on_from_what_was_executed_and_says_so_once(name, at_once, tmp_path):
+    _, _, _, events = lived(name, tmp_path / "whole", 45, at_once)
+    rng = stream(0, "rounding")
+    other = [
+        event
+        if event.theta is None
+        else event._replace(theta=ARM.policies.clip(event.theta + 1e-12 * rng.normal(size=5)))
+        for event in events
+    ]
+    with pytest.warns(RuntimeWarning, match="differs by rounding") as said:
+        learner, episodes, _, _ = lived(name, tmp_path / "other", 60, at_once, events=other)
+    assert len(said) == 1
+    executed = [event.theta for event in other if event.kind == Kind.MOVED]
+    assert np.array_equal(learner.memory.thetas[: len(executed)], executed)
+    assert len(episodes) == 60

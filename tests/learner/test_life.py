@@ -179,7 +179,7 @@ def saved(tmp_path):
     [
         (
             lambda: sgim_d(ARM, 7, correspondence=last_posture),
-            "movement 0 was recorded with another theta: theta_0 was",
+            "movement 0 was recorded with another theta: theta_3 was",
         ),
         (
             lambda: sgim_d(ARM, 6, correspondence=lambda times, trajectory: trajectory[0]),
