@@ -18,7 +18,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from itertools import chain
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -48,6 +48,12 @@ from sgimd_torch.spaces import (
 if TYPE_CHECKING:
     from sgimd_torch.learner.requests import Demonstrator
     from sgimd_torch.record import Record
+
+JOINS_EVERY: Final = 30
+"""Number of movements after which one more robot joins, until all of ``at_once`` move.
+
+Early movements decide from which family of movements all later ones come, so each should know the outcomes before it.
+"""
 
 Execute = Callable[[Sequence[int], Sequence[Array], Sequence[Array]], Sequence[Array | Failure]]
 """Function (indices, contexts, thetas) -> for each of these movements its outcome, or a failure."""
@@ -91,8 +97,8 @@ def run(
         record: record to write. Its events are replayed first; the replay executes nothing and asks no teacher of
             ``teachers``. Learner and teacher must be freshly built.
         failures: number of failed movements in a row that ends the run, at least 1.
-        at_once: number of robots that move at once, at least 1. `BatchEnvironment.execute_many` executes their
-            movements; other environments execute them one after the other.
+        at_once: number of robots that move at once, at least 1; after each 30 movements one more robot joins.
+            `BatchEnvironment.execute_many` executes their movements; other environments execute them one by one.
 
     Yields:
         Every episode, after the learner was told the outcome.
@@ -129,7 +135,7 @@ def run(
         while (first := learner.movements) < movements:
             contexts: list[Array | None] = []
             told: list[Array | Failure | None] = []
-            for place in range(min(at_once, movements - first)):
+            for place in range(min(at_once, max(1, first // JOINS_EVERY), movements - first)):
                 caused = _offered(learner, teacher, first + place, place, before.get(place, BeforeMovement()))
                 seen = _observed(learner, environment, first + place, place, seed)
                 if isinstance(seen, Failure):

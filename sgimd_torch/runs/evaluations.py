@@ -71,7 +71,8 @@ class Evaluations:
         At each goal the noise is the same for all inverse models. The noise floor is measured for the run's own model.
         """
         config, (own, *others) = self.config, self.inverses
-        repeats = config.repeats if movements in config.floors else 0
+        due = any(0 <= movements - each < config.at_once for each in config.floors)
+        repeats = config.repeats if due else 0
         judged: tuple[Any, ...] = self.environment, self.benchmark.goals, config.seed, movements
         found = {own: evaluate(self.inverses[own], *judged, repeats=repeats)}
         for word in others:
