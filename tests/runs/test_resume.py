@@ -129,8 +129,8 @@ def test_a_finished_run_made_longer_equals_a_long_run(tmp_path, go, algorithm, e
     assert go(tmp_path / "long", *options) == 0
     assert go(tmp_path / "extended", *options, "--movements", end) == 0
     assert go(tmp_path / "extended", *options, "--resume") == 0
-    extended = tmp_path / "extended/observation/seed-003"
-    assert content_of(extended) == content_of(tmp_path / "long/observation/seed-003")
+    extended = tmp_path / "extended" / algorithm / "seed-003"
+    assert content_of(extended) == content_of(tmp_path / "long" / algorithm / "seed-003")
     assert read_run(extended).config["movements"] == MOVEMENTS
 
 
