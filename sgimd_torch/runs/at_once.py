@@ -24,11 +24,17 @@ def check_at_once(environment: Environment, at_once: int) -> None:
     """Refuse more movements at once than the robot can make.
 
     Raises:
-        ValueError: the environment says that it can make fewer at once.
+        ValueError: the environment has a lower limit, or cannot be copied to other processes.
     """
+    name = type(environment).__name__
     if isinstance(environment, Limited) and at_once > environment.at_once:
-        name = type(environment).__name__
         raise ValueError(f"at_once must be at most {environment.at_once}, the at_once of {name}, got {at_once}")
+    if at_once > 1 and not isinstance(environment, BatchEnvironment):
+        try:
+            pickle.dumps(environment)
+        except Exception as error:  # code of a user may raise anything
+            way_out = "use --at-once 1, or give it execute_many()"
+            raise ValueError(f"{name} cannot be copied to other processes ({reason_of(error)}); {way_out}") from error
 
 
 def executing(environment: Environment, seed: int, at_once: int) -> AbstractContextManager[Execute]:
@@ -42,21 +48,15 @@ def executing(environment: Environment, seed: int, at_once: int) -> AbstractCont
 def in_processes(environment: Environment, seed: int, processes: int) -> Iterator[Execute]:
     """The function that executes movements in this number of ``processes``, which end with the block.
 
-    Raises:
-        ValueError: the environment cannot be copied to another process.
-        RuntimeError: when it executes, a process has ended.
+    It raises RuntimeError if one of the processes has ended.
     """
     import multiprocessing  # modules that most runs do not need
     from concurrent.futures import ProcessPoolExecutor
     from concurrent.futures.process import BrokenProcessPool
 
-    try:
-        pickled = pickle.dumps(environment)
-    except Exception as error:  # code of a user may raise anything
-        name = type(environment).__name__
-        raise ValueError(f"{name} cannot be copied to other processes ({reason_of(error)}); use --at-once 1") from error
     # A forked process would share the locks of this one's threads.
-    pool = ProcessPoolExecutor(processes, multiprocessing.get_context("spawn"), _begin, (pickled, seed))
+    spawning = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(processes, spawning, _begin, (pickle.dumps(environment), seed))
 
     def execute(indices: Sequence[int], contexts: Sequence[Array], thetas: Sequence[Array]) -> list[Array | Failure]:
         try:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
@@ -198,6 +198,10 @@ class Config:
         standard = (250, 500, *range(1000, self.movements, 1000))
         wanted = standard if self.evaluate_at is None else self.evaluate_at
         return sorted({movements for movements in wanted if movements < self.movements} | {self.movements})
+
+    def due(self, movements: int, numbers: Iterable[int]) -> bool:
+        """Whether one of ``numbers`` falls into the group of robots that ended after this number of ``movements``."""
+        return any(0 <= movements - each < self.at_once for each in numbers)
 
     @property
     def floors(self) -> tuple[int, ...]:

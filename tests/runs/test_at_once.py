@@ -1,6 +1,5 @@
 """Runs of robots that move at once: ``sgimd run --at-once 8``, processes for robots that move one by one, resuming."""
 
-import os
 import signal
 import subprocess
 import sys
@@ -18,12 +17,10 @@ from sgimd_torch.runs.directory import FILE
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.session import live
 from sgimd_torch.spaces import Failure, stream
-from worlds import NO_CONTEXT, problem
-
-BOXES = problem(noise=0.1)  # only for its boxes
+from worlds import NO_CONTEXT
 
 MODULE = """
-import os, time
+import os, threading, time
 import numpy as np
 from sgimd_torch.environments.planar_arm import PlanarArm
 class Slow(PlanarArm):
@@ -47,7 +44,7 @@ class Held(PlanarArm):
     execute_many = None
     def __init__(self):
         super().__init__()
-        self.driver = open(os.devnull)
+        self.driver = threading.Lock()
 """
 
 
@@ -89,7 +86,8 @@ def test_a_batch_of_planar_arms_equals_single_movements():
         assert np.array_equal(arm.execute_many(contexts, thetas, streams[1]), single)
 
 
-RUN = "--algorithm practice --at-once 4 --environment".split()
+UNJUDGED = ["--evaluate-at", "[]", "--benchmark", "null"]
+RUN = ["--algorithm", "practice", "--at-once", "4", "--environment"]
 
 
 def rows(folder):
@@ -99,14 +97,15 @@ def rows(folder):
 
 @pytest.mark.parametrize("robot", ["planar-arm-7", "robots_at_once:Odd"])
 def test_a_run_that_was_stopped_goes_on_to_the_rows_of_a_whole_one(go, own, tmp_path, robot, capfd):
-    place = f"practice/seed-000"
-    common = [*RUN, robot, "--evaluate-at", "100", "--repeats", "0", "--benchmark", "null"]
-    if robot.startswith("robots"):
-        common = [*RUN, robot, "--evaluate-at", "[]"]
+    place = "practice/seed-003"
+    common = [*RUN, robot, *UNJUDGED]
+    if robot == "planar-arm-7":
+        common += ["--evaluate-at", "100", "--repeats", "0"]
     assert go(tmp_path / "whole", *common, "--movements", "200") == 0
     assert go(tmp_path / "parts", *common, "--movements", "120") == 0
     assert go(tmp_path / "parts", *common, "--movements", "200", "--resume") == 0
     assert rows(tmp_path / "whole" / place) == rows(tmp_path / "parts" / place)
+    assert "after 10" not in capfd.readouterr().err  # the evaluation after 100 movements is kept
     found = read_run(tmp_path / "whole" / place)
     assert found.summary["movements"] == 200
     with Record(tmp_path / "whole" / place / FILE) as record:
@@ -119,7 +118,7 @@ def test_a_run_that_was_stopped_goes_on_to_the_rows_of_a_whole_one(go, own, tmp_
 def test_an_evaluation_comes_after_the_group_in_which_it_falls(go, tmp_path):
     options = [*RUN, "planar-arm-7", "--evaluate-at", "121,150", "--repeats", "0", "--benchmark", "null"]
     assert go(tmp_path, *options, "--movements", "160") == 0
-    assert read_run(tmp_path / "practice" / "seed-000").evaluation["movements"].tolist() == [124, 152, 160]
+    assert read_run(tmp_path / "practice" / "seed-003").evaluation["movements"].tolist() == [124, 152, 160]
 
 
 @pytest.mark.parametrize(
@@ -131,7 +130,7 @@ def test_an_evaluation_comes_after_the_group_in_which_it_falls(go, tmp_path):
     ],
 )
 def test_robots_that_cannot_move_at_once_are_told(go, own, tmp_path, capfd, robot, code, said):
-    assert go(tmp_path, *RUN, f"robots_at_once:{robot}", "--evaluate-at", "[]", "--movements", "200") == code
+    assert go(tmp_path, *RUN, f"robots_at_once:{robot}", *UNJUDGED, "--movements", "200") == code
     assert said in capfd.readouterr().err
 
 
