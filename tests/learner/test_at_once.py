@@ -236,7 +236,7 @@ def test_too_many_failures_end_the_run_after_the_whole_group():
     robot, episodes = Together(lost), []
     learner = practice(robot, 0)
     learner.movements = 4
-    with pytest.raises(NoOutcomeError, match="3 movements in a row failed, the last one: ConnectionError: unplugged"):
+    with pytest.raises(NoOutcomeError, match="4 movements in a row failed, the last one: ConnectionError: unplugged"):
         episodes.extend(run(learner, robot, 0, movements=40, at_once=4, failures=3))
     assert learner.movements == 8
     assert len(episodes) == 4
