@@ -42,6 +42,7 @@ from .spaces import Box as Box
 from .spaces import Demonstration as Demonstration
 from .spaces import Episode as Episode
 from .spaces import Estimate as Estimate
+from .spaces import Failure as Failure
 from .spaces import Move as Move
 from .spaces import stream as stream
 from .teachers import AskedTeacher as AskedTeacher

@@ -18,7 +18,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from itertools import chain
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -38,6 +38,7 @@ from sgimd_torch.spaces import (
     Demonstration,
     Episode,
     Failure,
+    Move,
     Request,
     check_count,
     check_point,
@@ -48,6 +49,12 @@ from sgimd_torch.spaces import (
 if TYPE_CHECKING:
     from sgimd_torch.learner.requests import Demonstrator
     from sgimd_torch.record import Record
+
+JOINS_EVERY: Final = 30
+"""Number of movements after which one more robot joins, until all of ``at_once`` move.
+
+Early movements decide from which family of movements all later ones come, so each should know the outcomes before it.
+"""
 
 Execute = Callable[[Sequence[int], Sequence[Array], Sequence[Array]], Sequence[Array | Failure]]
 """Function (indices, contexts, thetas) -> for each of these movements its outcome, or a failure."""
@@ -91,8 +98,8 @@ def run(
         record: record to write. Its events are replayed first; the replay executes nothing and asks no teacher of
             ``teachers``. Learner and teacher must be freshly built.
         failures: number of failed movements in a row that ends the run, at least 1.
-        at_once: number of robots that move at once, at least 1. `BatchEnvironment.execute_many` executes their
-            movements; other environments execute them one after the other.
+        at_once: number of robots that move at once, at least 1; after each 30 movements one more robot joins.
+            `BatchEnvironment.execute_many` executes their movements; other environments execute them one by one.
 
     Yields:
         Every episode, after the learner was told the outcome.
@@ -100,7 +107,7 @@ def run(
     Raises (when iterated):
         ValueError: ``movements`` is not above the number that the learner has made, or the learner asks a teacher of
             unknown name.
-        NoOutcomeError: ``failures`` movements in a row have failed. They count; another `run` may go on.
+        NoOutcomeError: ``failures`` or more movements in a row have failed. They count; another `run` may go on.
     """
     check_count("failures", failures, 1)
     check_count("at_once", at_once, 1)
@@ -125,42 +132,34 @@ def run(
                 before = yield from replay(learner, chain([recorded], events), teacher=teacher)
             learner.listeners.append(record.add)
             until_the_end.callback(learner.listeners.remove, record.add)
-        in_a_row = 0
+        in_a_row: list[Failure] = []
         while (first := learner.movements) < movements:
-            contexts: list[Array | None] = []
-            told: list[Array | Failure | None] = []
-            for place in range(min(at_once, movements - first)):
-                caused = _offered(learner, teacher, first + place, place, before.get(place, BeforeMovement()))
-                seen = _observed(learner, environment, first + place, place, seed)
-                if isinstance(seen, Failure):
-                    contexts.append(None)
-                    told.append(seen)
-                else:
-                    if teachers and caused.request is None:
-                        caused = _asked(learner, environment, seen, place, teachers, caused)
-                    contexts.append(seen)
-                    told.append(None)
+            contexts: list[Array | Failure] = []
+            for place in range(min(at_once, max(1, first // JOINS_EVERY), movements - first)):
+                index = first + place
+                caused = _offered(learner, teacher, index, place, before.get(place, BeforeMovement()))
+                context = _observed(learner, environment, index, place, seed)
+                if teachers and caused.request is None and not isinstance(context, Failure):
+                    caused = _asked(learner, environment, context, place, teachers, caused)
                 before[place] = caused
+                contexts.append(context)
             moves = learner.ask_many(contexts)
-            chosen = [(first + k, contexts[k], move.theta) for k, move in enumerate(moves) if move is not None]
-            if chosen:
-                for (index, *_), reached in zip(chosen, execute(*zip(*chosen, strict=True)), strict=True):
-                    told[index - first] = reached
-            learner.tell_many(told)
-            too_many: Failure | None = None
-            for place, (context, move, outcome) in enumerate(zip(contexts, moves, told, strict=True)):
-                context = np.full(environment.contexts.dim, np.nan) if context is None else context
+            outcomes = _executed(execute, first, contexts, moves)
+            learner.tell_many(outcomes)
+            for place, (context, move, outcome) in enumerate(zip(contexts, moves, outcomes, strict=True)):
+                seen = np.full(environment.contexts.dim, np.nan) if isinstance(context, Failure) else context
                 caused = before.pop(place)
-                if not isinstance(outcome, Failure):
-                    in_a_row = 0 if move is not None else in_a_row
-                    yield Episode(first + place, context, move, outcome, *caused)
-                    continue
-                in_a_row += 1
-                too_many = outcome if in_a_row == failures else too_many
-                yield Episode(first + place, context, move, None, *caused, outcome.reason)
-            if too_many is not None:
-                reason = f"{failures} movements in a row failed, the last one: {too_many.reason}"
-                raise NoOutcomeError(reason) from too_many.cause
+                if isinstance(outcome, Failure):
+                    in_a_row.append(outcome)
+                    yield Episode(first + place, seen, move, None, *caused, outcome.reason)
+                else:
+                    if move is not None:
+                        in_a_row.clear()
+                    yield Episode(first + place, seen, move, outcome, *caused)
+            if len(in_a_row) >= failures:
+                last = in_a_row[-1]
+                reason = f"{len(in_a_row)} movements in a row failed, the last one: {last.reason}"
+                raise NoOutcomeError(reason) from last.cause
 
 
 def _offered(
@@ -202,6 +201,18 @@ def _asked(
         return before._replace(request=request, reply=reply)
     learner.watch(answer, place=place)
     return BeforeMovement(answer, request, reply)
+
+
+def _executed(
+    execute: Execute, first: int, contexts: Sequence[Array | Failure], moves: Sequence[Move | None]
+) -> list[Array | Failure | None]:
+    """For each robot its outcome, or why it has none; None: it rests. The first robot makes movement ``first``."""
+    outcomes: list[Array | Failure | None] = [each if isinstance(each, Failure) else None for each in contexts]
+    moving = [(first + k, contexts[k], move.theta) for k, move in enumerate(moves) if move is not None]
+    if moving:
+        for (index, *_), outcome in zip(moving, execute(*zip(*moving, strict=True)), strict=True):
+            outcomes[index - first] = outcome
+    return outcomes
 
 
 def _tried(name: str, dim: int, robot: Callable[..., ArrayLike], *given: Any) -> Array | Failure:

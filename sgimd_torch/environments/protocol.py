@@ -214,7 +214,7 @@ def execute_many(
     if len(thetas) == 0:
         return np.empty((0, environment.outcomes.dim))
     dim = environment.outcomes.dim
-    if isinstance(environment, BatchEnvironment):
+    if len(thetas) > 1 and isinstance(environment, BatchEnvironment):
         outcomes = _numbers("execute_many()", environment.execute_many(contexts, thetas, rngs), len(thetas), dim)
     else:
         moved = [environment.execute(*movement) for movement in zip(contexts, thetas, rngs, strict=True)]

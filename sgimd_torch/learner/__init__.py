@@ -137,12 +137,12 @@ class Learner:
             self.tell_many([None])
         return move
 
-    def ask_many(self, contexts: Sequence[ArrayLike | None]) -> list[Move | None]:
+    def ask_many(self, contexts: Sequence[ArrayLike | Failure]) -> list[Move | None]:
         """The next movements of several robots, before the outcome of any of them is known.
 
         Args:
-            contexts: context ``(context_dim,)`` of each robot; an attempt keeps its context, see `context_at`. None:
-                the robot failed before it saw a context.
+            contexts: context ``(context_dim,)`` of each robot, or its `Failure` if it could not see one. An attempt
+                keeps its context, see `context_at`.
 
         Returns:
             For each robot its movement. None: it rests, or has no context.
@@ -158,10 +158,11 @@ class Learner:
         if not len(contexts):
             raise ValueError("ask_many() needs a context for each robot, got none")
         dim = self.memory.context_dim
-        seen = [None if each is None else check_point("context", each, dim) for each in contexts]
+        seen = [each if isinstance(each, Failure) else check_point("context", each, dim) for each in contexts]
         for number, context in enumerate(seen):
             under_way = self.context_at(number)
-            if context is not None and under_way is not None and not np.array_equal(context, under_way):
+            other = under_way is not None and not isinstance(context, Failure) and (context != under_way).any()
+            if other:
                 raise RuntimeError(f"the attempt under way began in context {under_way}, got {context}; see idle")
         asked = [(place, self._propose(place, context)) for place, context in zip(self._places, seen, strict=False)]
         self._asked = asked
@@ -319,7 +320,7 @@ class Learner:
             reason: reason of the failure, for the record.
         """
         if not self._asked:
-            self.ask_many([None])
+            self.ask_many([Failure(reason)])
         self.tell_many([Failure(reason)] * len(self._asked))
 
     def interrupt(self) -> None:
@@ -349,10 +350,10 @@ class Learner:
         self._new.append(place)
         place.begin(self.autonomous.attempt(context), context)
 
-    def _propose(self, place: Place, context: Array | None) -> Move | Failure | None:
+    def _propose(self, place: Place, context: Array | Failure) -> Move | Failure | None:
         """The next movement at a place; a new attempt begins if none is under way there."""
-        if context is None:
-            return Failure("the robot saw no context")
+        if isinstance(context, Failure):
+            return context
         for _ in range(2):  # the attempt under way may end with a request that gets no reply
             if place.attempt is None:
                 self._begin(place, context)

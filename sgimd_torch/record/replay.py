@@ -87,9 +87,10 @@ def replay(
                 for number in range(index, last + 1):
                     _check_lesson(number, None, offered.pop(number, None))
                 places = [each.place for each in group]
-                contexts: list[Array | None] = [None] * (places[-1] + 1)
+                contexts: list[Array | Failure] = [Failure("")] * (places[-1] + 1)
                 for each in group:
-                    contexts[each.place] = None if _unseen(each) else each.context
+                    if each.context is not None and not _unseen(each):
+                        contexts[each.place] = each.context
                 moves = learner.ask_many(contexts)
                 for each in group:
                     if _check_move(learner, each, index + each.place, moves[each.place]):

@@ -5,16 +5,13 @@ with in_processes(arm, seed, 8) as execute: list(run(learner, arm, seed, movemen
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import pickle
 import signal
 import threading
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from multiprocessing.process import BaseProcess
+from typing import Any
 
 from sgimd_torch.environments.protocol import BatchEnvironment, Environment, Limited
 from sgimd_torch.session import Execute, live, reason_of
@@ -27,11 +24,17 @@ def check_at_once(environment: Environment, at_once: int) -> None:
     """Refuse more movements at once than the robot can make.
 
     Raises:
-        ValueError: the environment says that it can make fewer at once.
+        ValueError: the environment has a lower limit, or cannot be copied to other processes.
     """
+    name = type(environment).__name__
     if isinstance(environment, Limited) and at_once > environment.at_once:
-        name = type(environment).__name__
         raise ValueError(f"at_once must be at most {environment.at_once}, the at_once of {name}, got {at_once}")
+    if at_once > 1 and not isinstance(environment, BatchEnvironment):
+        try:
+            pickle.dumps(environment)
+        except Exception as error:  # code of a user may raise anything
+            way_out = "use --at-once 1, or give it execute_many()"
+            raise ValueError(f"{name} cannot be copied to other processes ({reason_of(error)}); {way_out}") from error
 
 
 def executing(environment: Environment, seed: int, at_once: int) -> AbstractContextManager[Execute]:
@@ -45,35 +48,39 @@ def executing(environment: Environment, seed: int, at_once: int) -> AbstractCont
 def in_processes(environment: Environment, seed: int, processes: int) -> Iterator[Execute]:
     """The function that executes movements in this number of ``processes``, which end with the block.
 
-    Raises:
-        ValueError: the environment cannot be copied to another process.
-        RuntimeError: when it executes, a process has ended.
+    It raises RuntimeError if one of the processes has ended.
     """
-    context = multiprocessing.get_context("spawn")  # a forked process would share the locks of this one's threads
+    import multiprocessing  # modules that most runs do not need
+    from concurrent.futures import ProcessPoolExecutor
+    from concurrent.futures.process import BrokenProcessPool
+
+    # A forked process would share the locks of this one's threads.
+    spawning = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(processes, spawning, _begin, (pickle.dumps(environment), seed))
+
+    def execute(indices: Sequence[int], contexts: Sequence[Array], thetas: Sequence[Array]) -> list[Array | Failure]:
+        try:
+            return list(pool.map(_execute, indices, contexts, thetas))
+        except BrokenProcessPool as error:
+            raise RuntimeError("a process that executes movements has ended; is memory short?") from error
+
     try:
-        pickled = pickle.dumps(environment)
-    except Exception as error:  # code of a user may raise anything
-        name = type(environment).__name__
-        raise ValueError(f"{name} cannot be copied to other processes ({reason_of(error)}); use --at-once 1") from error
-    with ProcessPoolExecutor(processes, context, _begin, (pickled, seed)) as pool:
-
-        def execute(
-            indices: Sequence[int], contexts: Sequence[Array], thetas: Sequence[Array]
-        ) -> list[Array | Failure]:
-            try:
-                return list(pool.map(_execute, indices, contexts, thetas))
-            except BrokenProcessPool as error:
-                raise RuntimeError("a process that executes movements has ended; is memory short?") from error
-
         yield execute
+    except BaseException:  # after a second Ctrl-C, too, nothing waits for a robot that hangs
+        for each in list(pool._processes.values()):
+            each.kill()
+        raise
+    finally:
+        pool.shutdown()
 
 
 def _begin(pickled: bytes, seed: int) -> None:
     """Begin a process: Ctrl-C is left to its parent, and it ends with its parent."""
     global _here
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = multiprocessing.parent_process()
-    assert parent is not None
+    from multiprocessing import parent_process
+
+    parent = parent_process()
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
     _here = live(pickle.loads(pickled), seed)
 
@@ -83,6 +90,6 @@ def _execute(index: int, context: Array, theta: Array) -> Array | Failure:
     return Failure(outcome.reason) if isinstance(outcome, Failure) else outcome  # its cause may not be picklable
 
 
-def _end_with(parent: BaseProcess) -> None:
+def _end_with(parent: Any) -> None:
     parent.join()
     os._exit(1)

@@ -15,6 +15,7 @@ from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.learner import Learner
 from sgimd_torch.learner.requests import Demonstrator
 from sgimd_torch.parts import Inverse, Teacher
+from sgimd_torch.runs.at_once import check_at_once
 from sgimd_torch.runs.config import ALGORITHM, OWN, Config
 from sgimd_torch.runs.tasks import Task, benchmark_of
 from sgimd_torch.spaces import Demonstration, stream
@@ -60,6 +61,7 @@ def build(config: Config) -> RunParts:
         FileNotFoundError: a file does not exist.
     """
     task = task_of(config)
+    check_at_once(task.environment, config.at_once)
     benchmark, notes, benchmark_crc32 = benchmark_of(task, config.benchmark)
     shown: dict[str, Any] = {}
     teacher: Teacher | None = None

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
@@ -55,6 +55,7 @@ class Config:
         benchmark: file of goals for evaluations; null: the environment's own.
         demonstrations: file of recorded demonstrations; null: the environment's own.
         failures: number of failed movements in a row that stops the run; null: 10.
+        at_once: number of robots that move at once; after each 30 movements one more robot joins.
         parts: parts and their options by name, such as "goals" or "goals.window"; defaults may be left out.
 
     Raises:
@@ -75,6 +76,7 @@ class Config:
     benchmark: Path | None = None
     demonstrations: Path | None = None
     failures: int | None = None
+    at_once: int = 1
     parts: Mapping[str, Any] | tuple[tuple[str, Any], ...] = ()
 
     def __post_init__(self) -> None:
@@ -84,7 +86,7 @@ class Config:
                 raise self._refused(name)
         differing = sorted((name, value) for name, value in given.items() if value != self.standards[name])
         object.__setattr__(self, "parts", tuple(differing))
-        for name, least in (("seed", 0), ("movements", 1), ("repeats", 0), ("failures", 1)):
+        for name, least in (("seed", 0), ("movements", 1), ("repeats", 0), ("failures", 1), ("at_once", 1)):
             value = getattr(self, name)
             if value is not None and value < least:
                 raise ValueError(f"{name} must be at least {least}, got {value}")
@@ -196,6 +198,10 @@ class Config:
         standard = (250, 500, *range(1000, self.movements, 1000))
         wanted = standard if self.evaluate_at is None else self.evaluate_at
         return sorted({movements for movements in wanted if movements < self.movements} | {self.movements})
+
+    def due(self, movements: int, numbers: Iterable[int]) -> bool:
+        """Whether one of ``numbers`` falls into the group of robots that ended after this number of ``movements``."""
+        return any(0 <= movements - each < self.at_once for each in numbers)
 
     @property
     def floors(self) -> tuple[int, ...]:

@@ -11,7 +11,7 @@ import importlib.util
 import platform
 import shutil
 import subprocess
-from itertools import count, takewhile
+from itertools import count
 from pathlib import Path
 from typing import Any, Final
 
@@ -116,9 +116,14 @@ def _forget_evaluations(record: Record, config: Config, *, anew: bool, notes: li
     made = list(dict.fromkeys(movements for movements, *_ in record.rows("evaluations")))
     ended = record.about["settings"]["movements"]  # if this run ends later, the noise is not measured here
     longer = config.floor_at is None and ended != config.movements
-    wanted = [each for each in made if each in config.evaluations and not anew and not (longer and each == ended)]
-    pairs = takewhile(lambda pair: pair[0] == pair[1], zip(wanted, config.evaluations, strict=False))
-    kept = [movements for movements, _ in pairs]
+    kept, left = list[int](), config.evaluations
+    for each in made:
+        if anew or not config.due(each, config.evaluations) or (longer and each == ended):
+            continue
+        if not config.due(each, left[:1]):
+            break
+        kept.append(each)
+        left = [wanted for wanted in left if wanted > each]
     if others := [str(movements) for movements in made if movements not in kept]:
         notes.append(f"evaluations after {', '.join(others)} movements are dropped, or repeated if requested")
         for table in EVALUATED:

@@ -71,7 +71,7 @@ class Evaluations:
         At each goal the noise is the same for all inverse models. The noise floor is measured for the run's own model.
         """
         config, (own, *others) = self.config, self.inverses
-        repeats = config.repeats if movements in config.floors else 0
+        repeats = config.repeats if config.due(movements, config.floors) else 0
         judged: tuple[Any, ...] = self.environment, self.benchmark.goals, config.seed, movements
         found = {own: evaluate(self.inverses[own], *judged, repeats=repeats)}
         for word in others:

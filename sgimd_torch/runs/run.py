@@ -16,11 +16,12 @@ from typing import Final, Protocol, Self
 from sgimd_torch.environments.protocol import FAILURES, SimulationError
 from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.record import ReplayError, RunError
+from sgimd_torch.runs.at_once import executing
 from sgimd_torch.runs.build import RunParts
 from sgimd_torch.runs.directory import open_run
 from sgimd_torch.runs.evaluations import Evaluations
 from sgimd_torch.runs.process import Failed, Progress, Stopped, Stopping, say
-from sgimd_torch.session import NoOutcomeError, live, reason_of, run
+from sgimd_torch.session import NoOutcomeError, reason_of, run
 from sgimd_torch.spaces import Episode
 
 TOLD: Final = 3  # first failures, with a message each; later ones are only counted
@@ -141,7 +142,7 @@ class Life:
                 progress.show(self.movements, "" if last is None else f"error {unit(last.mean_error, '.4f')}")
                 if self.movements == self.recorded < total:
                     progress.begin(title, total, self.movements)
-                if stopping.heard:
+                if stopping.heard and self._all_told:
                     if not self.replaying:
                         self.commit()
                     raise Stopped(stopping.heard)
@@ -149,24 +150,31 @@ class Life:
 
     def episodes(self) -> Iterator[Episode]:
         """All episodes, one by one: first the recorded ones, then new ones."""
-        parts, seed = self.parts, self.parts.config.seed
-        episodes = run(
-            parts.learner,
-            parts.environment,
-            seed,
-            movements=parts.config.movements,
-            teacher=parts.teacher,
-            teachers=parts.teachers,
-            execute=self.seconds.of("physics")(live(parts.environment, seed)),
-            record=self.record,
-            failures=parts.config.failures or FAILURES,
-        )
-        if not self.recorded:
-            self._begin()
-        following = self.seconds.of("learner")(partial(next, episodes, None))
-        for episode in iter(following, None):
-            self._after(episode)
-            yield episode
+        parts, config = self.parts, self.parts.config
+        with executing(parts.environment, config.seed, config.at_once) as execute:
+            episodes = run(
+                parts.learner,
+                parts.environment,
+                config.seed,
+                movements=config.movements,
+                teacher=parts.teacher,
+                teachers=parts.teachers,
+                execute=self.seconds.of("physics")(execute),
+                record=self.record,
+                failures=config.failures or FAILURES,
+                at_once=config.at_once,
+            )
+            if not self.recorded:
+                self._begin()
+            following = self.seconds.of("learner")(partial(next, episodes, None))
+            for episode in iter(following, None):
+                self._after(episode)
+                yield episode
+
+    @property
+    def _all_told(self) -> bool:
+        """Whether the episodes of all robots that moved at once were told to the listeners."""
+        return self.movements == self.parts.learner.movements
 
     def commit(self) -> None:
         """Write everything to the disk."""
@@ -193,7 +201,9 @@ class Life:
                 say(f"movement {episode.index} failed: {episode.failed}{more}")
         for each in self.listeners:
             each.episode(episode, replayed)
-        if self.movements in self._wanted:
+        due = {each for each in self._wanted if each <= self.movements}
+        if due and self._all_told:
+            self._wanted -= due
             self._evaluate()
         if self.movements == self.recorded:
             self._begin()

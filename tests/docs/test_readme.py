@@ -35,7 +35,7 @@ HOW_TO = tuple(
 )
 OTHERS = (  # each in a folder of its own
     "docs/runs.md",
-    *(f"docs/how-to/{name}.md" for name in ("ablations", "gymnasium", "real-robot", "resuming")),
+    *(f"docs/how-to/{name}.md" for name in ("ablations", "gymnasium", "real-robot", "resuming", "several-robots")),
     *(f"docs/explained/{name}.md" for name in ("random-numbers", "noise")),
     pytest.param("docs/tutorial.md", marks=pytest.mark.slow),  # the rod's physics
     pytest.param("docs/how-to/forward-model.md", marks=pytest.mark.slow),  # torch

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from sgimd_torch import session
 from sgimd_torch.algorithms.practice import practice, practice_taught
 from sgimd_torch.asking.algorithms import SEARCHING, sgim_acts
 from sgimd_torch.asking.teachers import AnsweringTeacher
@@ -22,6 +23,11 @@ LEARNERS = {
     "practice-taught": lambda: practice_taught(ARM, 0, correspondence=last_posture),
     "asking": lambda: sgim_acts(ARM, 0, teachers=teachers(), correspondence=last_posture, **SEARCHING),
 }
+
+
+@pytest.fixture(autouse=True)
+def _all_robots_join_soon(monkeypatch):
+    monkeypatch.setattr(session, "JOINS_EVERY", 1)
 
 
 def teachers():
@@ -218,7 +224,9 @@ def lost(outcomes):
 )
 def test_what_execute_many_does_wrong_fails_the_movements_that_it_concerns(outcomes, failed):
     robot = Together(outcomes)
-    episodes = list(run(practice(robot, 0), robot, 0, movements=4, at_once=4))
+    learner = practice(robot, 0)
+    learner.movements = 4
+    episodes = list(run(learner, robot, 0, movements=8, at_once=4))
     for episode, reason in zip(episodes, failed, strict=True):
         assert reason in episode.failed
         assert bool(reason) == bool(episode.failed)
@@ -227,9 +235,11 @@ def test_what_execute_many_does_wrong_fails_the_movements_that_it_concerns(outco
 def test_too_many_failures_end_the_run_after_the_whole_group():
     robot, episodes = Together(lost), []
     learner = practice(robot, 0)
-    with pytest.raises(NoOutcomeError, match="3 movements in a row failed, the last one: ConnectionError: unplugged"):
+    learner.movements = 4
+    with pytest.raises(NoOutcomeError, match="4 movements in a row failed, the last one: ConnectionError: unplugged"):
         episodes.extend(run(learner, robot, 0, movements=40, at_once=4, failures=3))
-    assert learner.movements == 4
+    assert learner.movements == 8
+    assert len(episodes) == 4
 
 
 @pytest.mark.parametrize("at_once", [1, 3])
@@ -249,3 +259,10 @@ def test_a_record_that_differs_by_rounding_goes_on_from_what_was_executed_and_sa
     executed = [event.theta for event in other if event.kind == Kind.MOVED]
     assert np.array_equal(learner.memory.thetas[: len(executed)], executed)
     assert len(episodes) == 60
+
+
+def test_one_more_robot_joins_after_each_30_movements(monkeypatch):
+    monkeypatch.undo()
+    groups, robot = [], Together(lambda outcomes: groups.append(len(outcomes)) or outcomes)
+    list(run(practice(robot, 0), robot, 0, movements=130, at_once=3))
+    assert groups == [2] * 15 + [3] * 13

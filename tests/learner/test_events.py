@@ -50,7 +50,7 @@ def act(learner, what, k, place=0):
             under_way = [learner.context_at(place) for place in range(1 + k)]
             contexts = [CONTEXTS[n % 2] if each is None else each for n, each in enumerate(under_way)]
             if what == "ask some":
-                contexts[place % len(contexts)] = None
+                contexts[place % len(contexts)] = Failure("lost")
             learner.ask_many(contexts)
         case "tell" if waits_for_outcome:
             outcomes = [np.array([0.1 * k, 0.2]) if isinstance(each, Move) else None for _, each in waits_for_outcome]
@@ -106,7 +106,7 @@ def test_whatever_has_happened_a_life_that_is_loaded_becomes_the_same_learner(tm
     save_life(whole, path)
     load_life(again, path)
     if whole._asked:  # these movements are asked for again
-        again.ask_many([None if isinstance(each, Failure) else place.context for place, each in whole._asked])
+        again.ask_many([each if isinstance(each, Failure) else place.context for place, each in whole._asked])
         for (_, mine), (_, theirs) in zip(whole._asked, again._asked, strict=True):
             assert repr(mine) == repr(theirs)
     assert state(again) == state(whole)

@@ -1,0 +1,152 @@
+"""Runs of robots that move at once: ``sgimd run --at-once 8``, processes for robots that move one by one, resuming."""
+
+import signal
+import subprocess
+import sys
+import time
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.record import Record
+from sgimd_torch.runs.at_once import in_processes
+from sgimd_torch.runs.directory import FILE
+from sgimd_torch.runs.read import read_run
+from sgimd_torch.session import live
+from sgimd_torch.spaces import Failure, stream
+from worlds import NO_CONTEXT
+
+MODULE = """
+import os, threading, time
+import numpy as np
+from sgimd_torch.environments.planar_arm import PlanarArm
+class Slow(PlanarArm):
+    execute_many = None
+    def execute(self, context, theta, rng):
+        time.sleep(0.02)
+        return super().execute(context, theta, rng)
+class Odd(PlanarArm):
+    execute_many = None
+    def execute(self, context, theta, rng):
+        if theta[0] > 0.95:
+            raise ConnectionError("stuck")
+        return super().execute(context, theta, rng) + 1e-9 * os.getpid() * 0
+class Mortal(PlanarArm):
+    execute_many = None
+    def execute(self, context, theta, rng):
+        os._exit(3)
+class Single(PlanarArm):
+    at_once = 1
+class Held(PlanarArm):
+    execute_many = None
+    def __init__(self):
+        super().__init__()
+        self.driver = threading.Lock()
+"""
+
+
+@pytest.fixture
+def own(tmp_path, monkeypatch):
+    """The module of this page's robots, in the working directory."""
+    (tmp_path / "robots_at_once.py").write_text(MODULE)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    import robots_at_once
+
+    yield robots_at_once
+    del sys.modules["robots_at_once"]
+
+
+def test_processes_give_the_outcomes_and_the_failures_of_one_process(own):
+    robot = own.Odd(3, noise=0.1)
+    thetas = stream(0, "thetas").random((12, 3))
+    thetas[5, 0] = 1.0
+    batch = range(12), [NO_CONTEXT] * 12, list(thetas)
+    alone = live(robot, 7)(*batch)
+    with in_processes(robot, 7, 2) as execute:
+        together = execute(*batch)
+    assert [isinstance(each, Failure) for each in together] == [k == 5 for k in range(12)]
+    for mine, theirs in zip(alone, together, strict=True):
+        if isinstance(mine, Failure):
+            assert theirs.reason == mine.reason == "ConnectionError: stuck"
+        else:
+            assert np.array_equal(mine, theirs)
+
+
+def test_a_batch_of_planar_arms_equals_single_movements():
+    for arm in (PlanarArm(7, noise=0.05), PlanarArm(50, noise=0.05, context=True)):
+        rng = stream(0, "batch")
+        contexts = np.array([arm.observe(rng) for _ in range(33)]).reshape(33, arm.contexts.dim)
+        thetas = rng.random((33, arm.policies.dim))
+        streams = [[stream(0, "noise", k) for k in range(33)] for _ in range(2)]
+        single = [arm.execute(*each) for each in zip(contexts, thetas, streams[0], strict=True)]
+        assert np.array_equal(arm.execute_many(contexts, thetas, streams[1]), single)
+
+
+UNJUDGED = ["--evaluate-at", "[]", "--benchmark", "null"]
+RUN = ["--algorithm", "practice", "--at-once", "4", "--environment"]
+
+
+def rows(folder):
+    with Record(folder / FILE) as record:
+        return list(record.rows("events")), list(record.rows("errors"))
+
+
+@pytest.mark.parametrize("robot", ["planar-arm-7", "robots_at_once:Odd"])
+def test_a_run_that_was_stopped_goes_on_to_the_rows_of_a_whole_one(go, own, tmp_path, robot, capfd):
+    place = "practice/seed-003"
+    common = [*RUN, robot, *UNJUDGED]
+    if robot == "planar-arm-7":
+        common += ["--evaluate-at", "100", "--repeats", "0"]
+    assert go(tmp_path / "whole", *common, "--movements", "200") == 0
+    assert go(tmp_path / "parts", *common, "--movements", "120") == 0
+    assert go(tmp_path / "parts", *common, "--movements", "200", "--resume") == 0
+    assert rows(tmp_path / "whole" / place) == rows(tmp_path / "parts" / place)
+    assert "after 10" not in capfd.readouterr().err  # the evaluation after 100 movements is kept
+    found = read_run(tmp_path / "whole" / place)
+    assert found.summary["movements"] == 200
+    with Record(tmp_path / "whole" / place / FILE) as record:
+        places = [event.place for event in record.events()]
+    sizes = [here + 1 for here, after in pairwise([*places, 0]) if after == 0]
+    assert sizes[:60] == [1] * 60
+    assert set(sizes[60:]) == {2, 3, 4}
+
+
+def test_an_evaluation_comes_after_the_group_in_which_it_falls(go, tmp_path):
+    options = [*RUN, "planar-arm-7", "--evaluate-at", "121,150", "--repeats", "0", "--benchmark", "null"]
+    assert go(tmp_path, *options, "--movements", "160") == 0
+    assert read_run(tmp_path / "practice" / "seed-003").evaluation["movements"].tolist() == [124, 152, 160]
+
+
+@pytest.mark.parametrize(
+    ("robot", "code", "said"),
+    [
+        ("Single", 2, "at_once must be at most 1, the at_once of Single, got 4"),
+        ("Held", 2, "Held cannot be copied to other processes (TypeError"),
+        ("Mortal", 1, "a process that executes movements has ended"),
+    ],
+)
+def test_robots_that_cannot_move_at_once_are_told(go, own, tmp_path, capfd, robot, code, said):
+    assert go(tmp_path, *RUN, f"robots_at_once:{robot}", *UNJUDGED, "--movements", "200") == code
+    assert said in capfd.readouterr().err
+
+
+def test_the_processes_end_with_a_run_that_is_killed(own, tmp_path):
+    options = [*RUN, "robots_at_once:Slow", "--evaluate-at", "[]", "--movements", "5000", "--out", str(tmp_path)]
+    with subprocess.Popen([sys.executable, "-m", "sgimd_torch", "run", *options], stderr=subprocess.PIPE) as run:
+        while not (children := children_of(run.pid)):
+            assert run.poll() is None
+            time.sleep(0.05)
+        run.send_signal(signal.SIGKILL)
+    while any(Path(f"/proc/{each}").exists() for each in children):
+        time.sleep(0.05)
+
+
+def children_of(pid):
+    """Processes that were begun by another one; at least four, as its robots move at once."""
+    found = Path(f"/proc/{pid}/task/{pid}/children")
+    listed = found.read_text().split() if found.exists() else []
+    return listed if len(listed) >= 4 else []
