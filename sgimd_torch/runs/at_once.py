@@ -1,20 +1,21 @@
-"""Robots that move at once, of an environment without ``execute_many``: a copy of it in each of several processes.
+"""Robots that move at once, of an environment without ``execute_many``: one in each of several processes.
 
-with in_processes(arm, seed, 8) as execute: list(run(learner, arm, seed, movements=2000, execute=execute, at_once=8))
+make = partial(PlanarArm, 7)
+with in_processes(make, seed, 8) as execute: list(run(learner, make(), seed, movements=900, execute=execute, at_once=8))
 """
 
 from __future__ import annotations
 
 import os
-import pickle
 import signal
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any
 
 from sgimd_torch.environments.protocol import BatchEnvironment, Environment, Limited
-from sgimd_torch.session import Execute, live, reason_of
+from sgimd_torch.runs.tasks import Task
+from sgimd_torch.session import Execute, live
 from sgimd_torch.spaces import Array, Failure
 
 _here: Execute  # of a process that executes movements
@@ -24,31 +25,34 @@ def check_at_once(environment: Environment, at_once: int) -> None:
     """Refuse more movements at once than the robot can make.
 
     Raises:
-        ValueError: the environment has a lower limit, or cannot be copied to other processes.
+        ValueError: the environment has a lower limit.
     """
-    name = type(environment).__name__
     if isinstance(environment, Limited) and at_once > environment.at_once:
+        name = type(environment).__name__
         raise ValueError(f"at_once must be at most {environment.at_once}, the at_once of {name}, got {at_once}")
-    if at_once > 1 and not isinstance(environment, BatchEnvironment):
-        try:
-            pickle.dumps(environment)
-        except Exception as error:  # code of a user may raise anything
-            way_out = "use --at-once 1, or give it execute_many()"
-            raise ValueError(f"{name} cannot be copied to other processes ({reason_of(error)}); {way_out}") from error
 
 
-def executing(environment: Environment, seed: int, at_once: int) -> AbstractContextManager[Execute]:
-    """The function that executes movements: in processes where that is faster, else in this one."""
+def executing(
+    environment: Environment, make: Callable[[], Any], seed: int, at_once: int
+) -> AbstractContextManager[Execute]:
+    """The function that executes movements: in this process, or in several if that is faster.
+
+    Args:
+        environment: environment of the movements.
+        make: constructor of the environment.
+        seed: number from which the random streams of the environment come.
+        at_once: number of robots that move at once.
+    """
     if at_once == 1 or isinstance(environment, BatchEnvironment):
         return nullcontext(live(environment, seed))
-    return in_processes(environment, seed, at_once)
+    return in_processes(make, seed, at_once)
 
 
 @contextmanager
-def in_processes(environment: Environment, seed: int, processes: int) -> Iterator[Execute]:
+def in_processes(make: Callable[[], Any], seed: int, processes: int) -> Iterator[Execute]:
     """The function that executes movements in this number of ``processes``, which end with the block.
 
-    It raises RuntimeError if one of the processes has ended.
+    Each process makes an environment, or a `Task`, by ``make``. RuntimeError when it executes: a process has ended.
     """
     import multiprocessing  # modules that most runs do not need
     from concurrent.futures import ProcessPoolExecutor
@@ -56,13 +60,13 @@ def in_processes(environment: Environment, seed: int, processes: int) -> Iterato
 
     # A forked process would share the locks of this one's threads.
     spawning = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(processes, spawning, _begin, (pickle.dumps(environment), seed))
+    pool = ProcessPoolExecutor(processes, spawning, _begin, (make, seed))
 
     def execute(indices: Sequence[int], contexts: Sequence[Array], thetas: Sequence[Array]) -> list[Array | Failure]:
         try:
             return list(pool.map(_execute, indices, contexts, thetas))
         except BrokenProcessPool as error:
-            raise RuntimeError("a process that executes movements has ended; is memory short?") from error
+            raise RuntimeError("a process that executes movements has ended; is one robot all there is?") from error
 
     try:
         yield execute
@@ -74,7 +78,7 @@ def in_processes(environment: Environment, seed: int, processes: int) -> Iterato
         pool.shutdown()
 
 
-def _begin(pickled: bytes, seed: int) -> None:
+def _begin(make: Callable[[], Any], seed: int) -> None:
     """Begin a process: Ctrl-C is left to its parent, and it ends with its parent."""
     global _here
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -82,7 +86,8 @@ def _begin(pickled: bytes, seed: int) -> None:
 
     parent = parent_process()
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
-    _here = live(pickle.loads(pickled), seed)
+    made = make()
+    _here = live(made.environment if isinstance(made, Task) else made, seed)
 
 
 def _execute(index: int, context: Array, theta: Array) -> Array | Failure:

@@ -151,7 +151,8 @@ class Life:
     def episodes(self) -> Iterator[Episode]:
         """All episodes, one by one: first the recorded ones, then new ones."""
         parts, config = self.parts, self.parts.config
-        with executing(parts.environment, config.seed, config.at_once) as execute:
+        robot = parts.environment, config.constructor("environment")
+        with executing(*robot, config.seed, config.at_once) as execute:
             episodes = run(
                 parts.learner,
                 parts.environment,

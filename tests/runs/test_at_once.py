@@ -4,6 +4,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -20,7 +21,7 @@ from sgimd_torch.spaces import Failure, stream
 from worlds import NO_CONTEXT
 
 MODULE = """
-import os, threading, time
+import os, time
 import numpy as np
 from sgimd_torch.environments.planar_arm import PlanarArm
 class Slow(PlanarArm):
@@ -40,11 +41,6 @@ class Mortal(PlanarArm):
         os._exit(3)
 class Single(PlanarArm):
     at_once = 1
-class Held(PlanarArm):
-    execute_many = None
-    def __init__(self):
-        super().__init__()
-        self.driver = threading.Lock()
 """
 
 
@@ -66,7 +62,7 @@ def test_processes_give_the_outcomes_and_the_failures_of_one_process(own):
     thetas[5, 0] = 1.0
     batch = range(12), [NO_CONTEXT] * 12, list(thetas)
     alone = live(robot, 7)(*batch)
-    with in_processes(robot, 7, 2) as execute:
+    with in_processes(partial(own.Odd, 3, noise=0.1), 7, 2) as execute:
         together = execute(*batch)
     assert [isinstance(each, Failure) for each in together] == [k == 5 for k in range(12)]
     for mine, theirs in zip(alone, together, strict=True):
@@ -95,7 +91,7 @@ def rows(folder):
         return list(record.rows("events")), list(record.rows("errors"))
 
 
-@pytest.mark.parametrize("robot", ["planar-arm-7", "robots_at_once:Odd"])
+@pytest.mark.parametrize("robot", ["planar-arm-7", "toss", "robots_at_once:Odd"])
 def test_a_run_that_was_stopped_goes_on_to_the_rows_of_a_whole_one(go, own, tmp_path, robot, capfd):
     place = "practice/seed-003"
     common = [*RUN, robot, *UNJUDGED]
@@ -125,7 +121,6 @@ def test_an_evaluation_comes_after_the_group_in_which_it_falls(go, tmp_path):
     ("robot", "code", "said"),
     [
         ("Single", 2, "at_once must be at most 1, the at_once of Single, got 4"),
-        ("Held", 2, "Held cannot be copied to other processes (TypeError"),
         ("Mortal", 1, "a process that executes movements has ended"),
     ],
 )
