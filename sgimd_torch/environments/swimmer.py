@@ -35,7 +35,7 @@ class Swimmer(FromGymnasium):
                 "Swimmer-v5",
                 reset_noise_scale=start,
                 exclude_current_positions_from_observation=False,
-                disable_env_checker=True,  # the checker would check every step
+                disable_env_checker=True,  # the checker costs time
             ),
             Sinusoids(Box.cube(-1.0, 1.0, 2), FREQUENCIES),
             outcomes=Box.cube(-1.5, 1.5, 2, names=("x", "y"), unit="m"),

@@ -73,8 +73,8 @@ class Region:
     """R_i, a leaf of the tree. A Region is immutable: adding a goal makes a new Region.
 
     ``path`` is the name of the region: "R" is the root, "R0" its half below the cut, "R1" its half above the cut, and
-    "R01" the upper half of "R0". ``low`` and ``high`` are the corners in C x T. The goals are in order of time, in
-    ``points`` ``(n, context_dim + outcome_dim)``, ``competences``, ``gains`` and names of ``strategies`` ``(n,)``.
+    "R01" the upper half of "R0". ``low`` and ``high`` are the corners in C x T. ``points``
+    ``(n, context_dim + outcome_dim)``, ``competences``, ``gains`` and ``strategies`` ``(n,)`` have a row for each goal.
     ``attempts`` also counts goals that the region forgot, but not goals that its parent forgot. Arrays are read-only.
     """
 

@@ -26,7 +26,7 @@ class RunError(ValueError):
 
 
 class ReplayError(RuntimeError):
-    """The learner does not repeat its record, because library version, processor or configuration differ."""
+    """A learner or its teacher does not repeat the record: version, processor, parts or seed differ."""
 
 
 _COUNTED: Final = (Kind.MOVED, Kind.RESTED, Kind.FAILED)  # events that count as movements

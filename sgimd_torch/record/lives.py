@@ -38,11 +38,11 @@ def load_life(
     """Let a learner repeat a saved life or the life of a run; it can then go on as if the life had never stopped.
 
     Args:
-        learner: learner, freshly built from the same parts.
+        learner: learner freshly built from the same parts.
         path: file that `save_life` wrote, or the ``run.sqlite`` of a run.
-        teacher: teacher, freshly built, too, if a teacher draws lessons at random: it is asked before each movement, as
-            in `run`, so that its draws go on in the same way. None to take all lessons from the file.
-        after: function to call with each movement (None: a rest), such as the refresh of a forward model in your loop.
+        teacher: teacher freshly built, if it draws at random: it is asked before each movement, as in `run`, so that
+            its draws go on in the same way. None: nobody is asked.
+        after: function that gets each movement, None at a rest, such as the refresh of a forward model in your loop.
 
     Raises:
         ReplayError: this learner makes another movement, or ends with another memory. It has then lived a part of
@@ -57,7 +57,7 @@ def load_life(
         for damage in record.check().values():
             raise RunError(damage)
         if record.dims != dims:
-            raise RunError(f"{path} has dims {record.dims} of context, theta, outcome, got {dims}; another robot?")
+            raise RunError(f"{path} has dims {record.dims} of context, theta, outcome, not {dims}; another robot?")
         begun, exemplars = record.about.get("begun", 0), record.about.get("exemplars")
         if begun != learner.begun:
             raise ReplayError(f"{path} began with {begun} exemplars in memory, this learner began with {learner.begun}")
@@ -65,4 +65,4 @@ def load_life(
             if after is not None:
                 after(episode.move)
     if exemplars not in (None, len(learner.memory)):
-        raise ReplayError(f"{path} ended with another memory; were exemplars added to either by hand?")
+        raise ReplayError(f"{path} ended with another memory; were exemplars added by hand?")

@@ -1,4 +1,4 @@
-"""Replay: a learner freshly built from equal parts repeats recorded events, and so equals the recorded learner.
+"""Replay: a new learner, built from the same parts, repeats recorded events, and so equals the recorded learner.
 
 The learner draws the same random numbers again, so goals, searches and memory are equal, even in the middle of an
 attempt. So `sgimd_torch.record` has to keep nothing but events.
@@ -22,40 +22,39 @@ from sgimd_torch.spaces import Array, Box, Demonstration, Episode, Failure, Move
 _HINT: Final = "was it recorded by another version, on another processor or with another configuration?"
 _ROUNDED: Final = (
     "movement {} was recorded with a theta that differs by rounding: another version or processor made the record. The "
-    "run goes on from what was executed"
+    "learner remembers the recorded theta"
 )
 
 
 def replay(
     learner: Learner, events: Iterable[Event], *, teacher: Teacher | None = None
 ) -> Generator[Episode, None, dict[int, BeforeMovement]]:
-    """Let ``learner`` repeat ``events``. Nothing is executed, and no demonstration is requested from anybody.
+    """Let ``learner`` repeat ``events``. Nothing is executed, and no recorded request reaches a teacher.
 
     Args:
         learner: learner freshly built.
         events: events of the record.
-        teacher: teacher, freshly built; its ``offer`` is called before each movement, so that its random draws continue
-            as in the recorded run. Demonstrations without ``who`` were not offered, and are taken from the record. None
-            to take all demonstrations from the record.
+        teacher: teacher freshly built, if it draws at random. Its ``offer`` is called before each movement, so that its
+            draws go on as in the run; an offer must equal the recorded demonstration. None: nobody is asked.
 
     Yields:
         Episodes, as `run` has yielded them.
 
     Returns:
-        Demonstration, request and reply of each robot after its last episode, by its place.
+        Demonstration, request and reply since the last episode of each robot, by the place of the robot.
 
     Raises (when iterated):
-        ReplayError: the learner proposes another movement than the recorded one, or the teacher offers another one. If
-            a theta differs by rounding, see `Box.same`, there is one `RuntimeWarning`, and the recorded theta counts.
+        ReplayError: the learner proposes a movement, or the teacher a demonstration, that differs from the record. A
+            theta that differs by rounding, see `Box.same`, gives one `RuntimeWarning`, and the recorded theta counts.
     """
     rounded = False
     offered: dict[int, Demonstration | None] = {}  # by number of the movement
-    asked_until = 0  # number of the first movement before which the teacher was not asked so far
+    asked_until = 0  # the teacher was asked before all movements below this number
     before: dict[int, BeforeMovement] = {}
     for group in _together(events):
         event, index = group[0], learner.movements
         last = index + group[-1].place
-        # Between two runs the caller may show something, or begin or end an attempt; no teacher is asked before that.
+        # Between two runs the caller may show something, or begin or end an attempt; then no teacher is asked.
         between = event.place < 0 or (event.kind in (Kind.SHOWN, Kind.ASKED) and event.who is None)
         if teacher is not None and not between:
             offered |= {k: teacher.offer(k, learner.memory) for k in range(max(asked_until, index), last + 1)}
@@ -65,7 +64,7 @@ def replay(
                 if event.who == TEACHER and teacher is not None:
                     _check_lesson(last, event.lesson, offered.pop(last, None))
                 if learner.social is None and not learner.waits_for_answer:
-                    found = f"before movement {last} the learner asked for a demonstration, now it does not"
+                    found = f"before movement {last} the learner was shown a demonstration, now it takes none"
                     raise ReplayError(f"{found}; is it built in the same way and with the same seed?")
                 assert event.lesson is not None
                 learner.watch(event.lesson, who=event.who, place=event.place)
@@ -82,7 +81,7 @@ def replay(
                         learner.go_on_alone(event.reply or "", place=event.place)
             case Kind.INTERRUPTED if between:
                 learner.interrupt()
-                asked_until = index  # the resumed run asked its teacher once more
+                asked_until = index  # when the run was resumed, its teacher was asked again
             case _:
                 for number in range(index, last + 1):
                     _check_lesson(number, None, offered.pop(number, None))
@@ -101,7 +100,7 @@ def replay(
                         rounded = True
                 if event.kind == Kind.INTERRUPTED:
                     learner.interrupt()
-                    asked_until = index  # the resumed run asked its teacher once more
+                    asked_until = index  # when the run was resumed, its teacher was asked again
                     continue
                 learner.tell_many([_told(each) for each in group])
                 for each in group:
@@ -115,7 +114,7 @@ def replay(
 
 
 def _together(events: Iterable[Event]) -> Iterator[list[Event]]:
-    """Events one by one, but all movements that were made at once together, in the order of their places."""
+    """Groups of events: movements that were made at once, by place of the robot; every other event is alone."""
     group: list[Event] = []
     for event in events:
         moved = event.kind not in (Kind.SHOWN, Kind.ASKED) and event.place >= 0

@@ -1,14 +1,14 @@
 """Three learners learn to fish; a figure and a table show their results.
 
-The three runs have the same seed, the same simulated arm and the same motor noise; two of them run at a time. random
-makes random movements. sgim-d has curiosity and a teacher. practice-taught, the best learner of this library, executes
+The three runs have the same seed, the same simulated arm and the same motor noise; two of them run at a time. `random`
+moves at random. sgim-d has curiosity and a teacher. practice-taught, the best learner of this library, executes
 all demonstrations once, then makes one movement for each goal. The command writes to --out (default: runs/demo):
 
   random/seed-000/ and so on   the record of each run (docs/runs.md explains the files)
   demo.png                     error against movements
 
-After Ctrl-C or a power cut, repeat the command to continue; finished runs are kept. Options of sgimd run apply to all
-three learners; sgimd run --help lists these options.
+After Ctrl-C or a power cut, repeat the command to continue; finished runs are kept. Other options of sgimd
+run, such as --movements, apply to all three learners.
 
   sgimd demo                                       the paper's 5000 movements, seed 0
   sgimd demo --movements 1000                      a first look, in half a minute
@@ -70,7 +70,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     table.main([str(base.out)])
     print(f"\nFigure  {figure}\nRuns    {base.out}\nTime    {time.monotonic() - began:.0f} s\n\nNext, try")
     print(f"  sgimd report {base.out}    # one page: curves, maps, interest")
-    print(f"  sgimd film {base.directory}    # SGIM-D casts at goals; needs the extra film")
+    print(f"  sgimd film {base.directory}    # SGIM-D casts at goals; needs sgimd-torch[film]")
     return 0
 
 

@@ -7,7 +7,7 @@ without this evaluation are left out, and named below the table. The worst varia
 Errors and noise floors are means over seeds, in the unit of T. With 5 seeds or more, the number after ± is the standard
 deviation of the errors over seeds. Times are milliseconds per movement.
 
---baseline adds a column: the interquartile mean of the differences error minus error of the baseline, at common seeds.
+--baseline adds a column: the error minus that of the baseline, as interquartile mean over common seeds.
 With 5 seeds or more, the brackets have its 95 % bootstrap interval. A number below 0 is better than the baseline.
 
   sgimd table runs
@@ -37,7 +37,7 @@ from sgimd_torch.views.variants import EARLY, Variant, baseline_of, best_first, 
 def parser() -> argparse.ArgumentParser:
     """The options of ``sgimd table``."""
     parser = parser_of("table", __doc__)
-    parser.add_argument("runs", type=Path, metavar="RUNS", help="folder of runs, of a variant or of variants")
+    parser.add_argument("runs", type=Path, metavar="RUNS", help="folder of a run, of a variant or of several variants")
     parser.add_argument("--at", type=int, metavar="MOVEMENTS", help="number of movements at which to compare")
     parser.add_argument("--baseline", metavar="NAME", help="variant to compare the others with, seed by seed")
     return parser

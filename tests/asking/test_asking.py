@@ -136,7 +136,7 @@ def test_a_request_that_waits_for_its_answer_is_saved_too(tmp_path):
     assert np.array_equal(robot.ask(NO_CONTEXT).theta, again.ask(NO_CONTEXT).theta)
     robot.tell([0.1, 0.2])
     save_life(robot, tmp_path / "life.sqlite")
-    with pytest.raises(ReplayError, match="before movement 0 the learner asked for a demonstration, now it does not"):
+    with pytest.raises(ReplayError, match="before movement 0 the learner was shown a demonstration, now it takes none"):
         load_life(sagg_riac(ARM, seed), tmp_path / "life.sqlite")
 
 

@@ -357,7 +357,7 @@ def test_what_has_no_picture_is_refused_in_a_line(own, capsys, word, message):
 
 def test_code_that_somebody_elses_run_names_is_executed_only_with_trust(own, capsys, monkeypatch):
     live("--environment sliders:Slider --algorithm random --movements 20 --evaluate-at [] --out runs --name one")
-    monkeypatch.setattr("sgimd_torch.catalogue.load", lambda *_: pytest.fail("it was imported"))
+    monkeypatch.setattr("sgimd_torch.runs.config.load_word", lambda *_: pytest.fail("it was imported"))
     assert command(film.main, ["runs/one/seed-000"]) == 2
     assert (
         "names code outside this library, sliders:Slider; read it, then execute it with --trust"

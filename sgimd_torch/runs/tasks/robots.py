@@ -18,9 +18,9 @@ from sgimd_torch.spaces import Array, Box, Demonstration, stream
 
 DATA: Final = SHIPPED_BENCHMARK.parent
 SIDE: Final = 0.1  # m, side of a benchmark tile; the disc of radius 1 m that an arm reaches has 311 goals
-SHOWN: Final = 127  # number of demonstrations, as of each shipped demonstrator
+SHOWN: Final = 127  # number of demonstrations, equal to that of the rod's demonstrators
 REACHING: Final = 20_000  # number of uniform movements by which the reachable part of T is found
-SAMPLES: Final = 5  # number of samples in the trajectory of each demonstration
+SAMPLES: Final = 5  # number of samples in the trajectory of an arm's demonstration
 
 
 def planar_arm(*, n_joints: int) -> Task:
@@ -49,14 +49,14 @@ def half_reached() -> Task:
 
 
 def arm_benchmark(arm: PlanarArm) -> Benchmark:
-    """One random goal in each tile of T that the arm can reach; the goals are equal in every run."""
+    """One random goal in each tile of T, if the arm can reach this goal; every run has the same goals."""
     box = arm.outcomes
     goals = tile_goals(np.tile(_grid(box, SIDE), (2, 1)), box, SIDE, stream(0, "goals for an arm"))
     return Benchmark(type(arm).__name__, goals[arm.reachable(goals)], SIDE)
 
 
 def arm_demonstrations(arm: PlanarArm) -> list[Demonstration]:
-    """Movements from rest to postures with all joint angles equal; outcomes spread evenly over the reachable disc."""
+    """Movements from rest to outcomes spread evenly over the reachable disc; all joints but the first bend equally."""
     shares = (np.arange(SHOWN) + 0.5) / SHOWN  # shares of the disc's area, which make a sunflower spiral
     turns = np.pi * (3 - np.sqrt(5)) * np.arange(SHOWN)
     ends = np.sqrt(shares)[:, None] * np.stack([np.cos(turns), np.sin(turns)], axis=1)
@@ -78,7 +78,7 @@ def _led_to(arm: PlanarArm, end: Array) -> Demonstration:
 
 
 def toy(make: Callable[[], Toy], side: float, *, taught: bool) -> Task:
-    """Task of a toy robot, with one goal in each tile of a ``side`` (unit of T), and a teacher if it is ``taught``."""
+    """Task of a toy robot, with one goal in each tile, ``side`` wide (unit of T), and a teacher if it is ``taught``."""
     robot = make()
     shown = partial(toy_demonstrations, robot) if taught else None
     return Task(robot, partial(toy_benchmark, robot, side), shown, last_row if taught else None)
@@ -99,7 +99,7 @@ fetch = partial(toy, objects.fetch, 0.1, taught=False)
 
 
 def toy_benchmark(robot: Toy, side: float) -> Benchmark:
-    """One random goal in each tile that uniform movements reach in the middle of C; goals are equal in every run."""
+    """One random goal in each tile that uniform movements reach in the middle context; all runs have the same goals."""
     rng = stream(0, "goals for a toy")
     thetas = robot.policies.low + robot.policies.sides * rng.random((REACHING, robot.policies.dim))
     context = (robot.contexts.low + robot.contexts.high) / 2
@@ -113,7 +113,7 @@ def last_row(times: Array, trajectory: Array) -> Array:
 
 
 def toy_demonstrations(robot: Toy) -> list[Demonstration]:
-    """Uniform movements with distinct outcomes, in contexts all over C; they are equal in every run."""
+    """Uniform movements with outcomes in T, in contexts all over C; every run has the same demonstrations."""
     rng = stream(0, "demonstrations by a toy")
     thetas = robot.policies.low + robot.policies.sides * rng.random((REACHING, robot.policies.dim))
     found = []

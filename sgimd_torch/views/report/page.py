@@ -25,7 +25,7 @@ def page(place: Path, variants: Sequence[Variant], baseline: str | None = None) 
         baseline: name of the variant to compare the others with; None for the default of `baseline_of`.
 
     Raises:
-        ValueError: no variant with errors is called ``baseline``.
+        ValueError: ``baseline`` is no variant that was evaluated.
     """
     reference = baseline_of(variants, baseline)
     runs = [run for variant in variants for run in variant.runs]
