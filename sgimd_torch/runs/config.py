@@ -50,7 +50,7 @@ class Config:
             never, not even at the end.
         evaluated_by: inverse models to evaluate: first own, which is the run's, then names for --inverse.
         repeats: number of extra executions of each evaluation movement, for the noise; 0: none.
-        floor_at: evaluations that measure the noise; null: the last; []: none.
+        floor_at: evaluations that measure noise; null: the last; []: none.
         benchmark: file of goals for evaluations; null: the environment's own.
         demonstrations: file of recorded demonstrations; null: the environment's own.
         failures: number of failed movements in a row that stops the run; null: 10.

@@ -309,7 +309,7 @@ def test_a_life_that_started_from_a_memory_is_loaded_by_one_that_starts_from_the
 
 
 def test_a_memory_of_another_robot_is_no_start():
-    with pytest.raises(ValueError, match=r"must have dims \(0, 4, 2\) of context, theta, outcome, not \(0, 5, 2\)"):
+    with pytest.raises(ValueError, match=r"must have dims \(0, 4, 2\) of context, theta, outcome, got \(0, 5, 2\)"):
         sagg_riac(ARM, 0, memory=exemplars(3, PlanarArm(5)))
     memory = Memory(0, 4, 2)
     memory.add(NO_CONTEXT, np.full(4, 1.5), [0.0, 0.0])
