@@ -498,7 +498,6 @@ def test_what_a_robot_cannot_repeat_is_never_written(tmp_path, module, capsys):
     shown = of_servant(tmp_path, module, texts, "--unit", "rad", "--skip-unusable")
     assert len(shown) == 1
     assert capsys.readouterr().err.count("left out ") == 4
-    still = [rise[0]] * 20 + rise + [rise[-1]] * 20
 
 
 @pytest.mark.parametrize("words", [("--trim",), ("--speed", 3)])
