@@ -44,8 +44,7 @@ def read_lerobot(root: str | os.PathLike[str], columns: Columns) -> tuple[list[R
     """
     root = Path(root)
     if root.is_file():
-        homes = [folder for folder in root.absolute().parents if (folder / "meta/info.json").exists()]
-        whole = homes[0] if homes else "the folder with meta and data"
+        whole = next((each for each in root.absolute().parents if (each / "meta").is_dir()), "its folder with meta")
         raise ValueError(f"{root} is one file of a LeRobot dataset; name the dataset instead: {whole}")
     info = _info(root)
     version = str(info.get("codebase_version"))

@@ -18,8 +18,9 @@ from sgimd_torch.spaces import Array, Box
 
 _RANGE: Final = re.compile(r"(-?\d+\.?\d*):(-?\d+\.?\d*)")
 _TURN: Final = 7.0  # rad, a little more than a turn; a joint that reads more may be in degrees
-_STILL: Final = 0.01  # share of the largest travel of a joint; until one is farther away, the robot stands still
-_MOVES: Final = 1e-3  # rad or a command; least travel of a recording that moves
+_MOVES: Final = 0.02  # rad/s; joints that were never faster count as unmoved
+_STILL: Final = 0.05  # share of the largest speed of a recording; while all joints are slower, they pause
+_FEWEST: Final = 4  # steps of a movement; with a jerk all other steps are slow, as if they were pauses
 
 
 def in_units(
@@ -91,12 +92,13 @@ def moving(times: Array, joints: Array) -> tuple[Array, Array]:
     """The recording without the pauses before and after the movement; its times start at 0.
 
     Raises:
-        ValueError: no joint ever moves.
+        ValueError: no joint moved, or a jerk makes the other steps look like pauses.
     """
-    travel = np.ptp(joints, axis=0).max()
-    if travel < _MOVES:
+    speeds = np.abs(np.diff(joints, axis=0)).max(axis=1) / np.diff(times)
+    if not speeds.max() > _MOVES:
         raise ValueError("no joint moved")
-    near = _STILL * travel
-    away, before = ((np.abs(joints - joints[end]) > near).any(axis=1) for end in (0, -1))
-    first, last = away.argmax() - 1, len(joints) - before[::-1].argmax()
+    moved = np.flatnonzero(speeds > _STILL * speeds.max())
+    if len(moved) < _FEWEST:
+        raise ValueError(f"it moves in {len(moved)} of {len(speeds)} steps and else hardly; has it a jerk?")
+    first, last = moved[0], moved[-1] + 1
     return times[first : last + 1] - times[first], joints[first : last + 1]

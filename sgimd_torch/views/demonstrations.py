@@ -133,6 +133,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     importing = options.command == "import"
     if importing and options.out.suffix != ".npz":
         raise ValueError(f"--out must end in .npz, got {options.out}")
+    if not options.source.is_file() and not options.source.is_dir():
+        raise FileNotFoundError(f"there is no {options.source}")
     task = None
     if options.environment:
         task = task_of(parse([f"--environment={options.environment}", f"--algorithm={ALONE}", *of_robot])[0])
@@ -162,11 +164,9 @@ def read(options: argparse.Namespace, ranges: Box | None) -> list[Recording]:
 
     Raises:
         ValueError: the source is damaged, or names or units of its columns are missing.
-        OSError: there is no such source.
+        OSError: the source cannot be read.
     """
     source: Path = options.source
-    if not source.is_file() and not source.is_dir():
-        raise FileNotFoundError(f"there is no {source}")
     if source.suffix == ".npz":
         return [Recording(str(row), each) for row, each in enumerate(load_demonstrations(source))]
     is_dataset = any((source / folder).is_dir() for folder in ("meta", "meta_data"))
@@ -213,8 +213,9 @@ def check(task: Task, shown: Demonstration, row: int) -> Checked:
         theta = theta_of(task, shown)
         lands = execute_many(robot, context[None], theta[None], [stream(row, "demonstrations check")])[0]
         if not shown.outcome.size:
-            replayed = isinstance(robot, Replaying) and not context.size  # a replay has no context
-            outcome = robot.replay(shown.times, shown.trajectory) if replayed else lands
+            outcome = lands
+            if isinstance(robot, Replaying) and not context.size:  # a replay has no context
+                outcome = robot.replay(shown.times, shown.trajectory)
             shown = replace(shown, outcome=outcome)
             remarks = beyond_limits(robot, shown)
     except (ValueError, SimulationError) as error:
@@ -228,7 +229,8 @@ def _on_robot(task: Task, found: Sequence[Recording], source: Path) -> list[Reco
     if contexts.dim and any(each.shown is not None and not each.shown.context.size for each in found):
         what = ", ".join(contexts.axis(k, "context") for k in range(contexts.dim))
         raise ValueError(f"{source} has no context ({what}); name its columns with --context")
-    table, after, apart, remarked = [HEADS], list[Recording](), list[float](), 0
+    table: list[Sequence[str]] = [HEADS]
+    after, apart, remarked = list[Recording](), list[float](), 0
     for row, each in enumerate(found):
         if each.shown is None:
             table.append((each.name, *"------", f"cannot be used: {each.refused}"))

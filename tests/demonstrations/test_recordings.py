@@ -73,10 +73,6 @@ RIGHT = {
     "degrees by joint": (degrees(ONE), f"{NAMED} --unit a=deg,b=deg"),
     "degrees of all but one": (ONE.replace("0.2", "0.2"), f"{NAMED} --unit deg,a=rad,b=rad"),
     "twice as slow": (ONE.replace("2.5", "3.0").replace("3.0,0.5", "4.0,0.5"), f"{NAMED} --speed 2"),
-    "stillness at both ends": (
-        ONE.replace("2.0,", "1.0,0.1,0.2,9,9\n2.0,") + "4.0,0.5,0.6,9,9\n5.0,0.5,0.6,0.7,-0.8\n",
-        f"{NAMED} --trim",
-    ),
     "a vector": (ONE, "--joints a,b[0] --outcome x,y"),
 }
 REFUSED = {
@@ -126,6 +122,11 @@ REFUSED = {
     "a range without a robot": (ONE, f"{NAMED} --unit a=0:100", "a=0:100 maps onto the range of a joint of a robot"),
     "a unit of no joint": (ONE, f"{NAMED} --unit c=deg", "no joint is named c; did you mean"),
     "stillness": (ONE.replace("0.3,0.4", "0.1,0.2").replace("0.5,0.6", "0.1,0.2"), f"{NAMED} --trim", "no joint moved"),
+    "a jerk": (
+        ONE.replace("2.0,", "1.999,9.1,0.2,9,9\n2.0,").replace("2.5", "8.5").replace("3.0,", "11.,"),
+        f"{NAMED} --trim --unit rad",
+        "it moves in 1 of 3 steps and else hardly; has it a jerk",
+    ),
     "an entry of a number": (ONE, "--joints a[1] --outcome x", r"there is no a\[1\]: a has 1 entries"),
     "no outcome": (ONE, "--joints a,b", "needs outcomes: name their columns with --outcome .* with --environment"),
     "no joints": (ONE, "--outcome x,y", "name its columns of joints: --joints"),
