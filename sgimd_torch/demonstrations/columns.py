@@ -160,7 +160,10 @@ def _values(table: Table, names: Sequence[str], rows: slice) -> tuple[Array, lis
 def _numbers(table: Table, name: str, rows: slice) -> Array:
     values = table.columns[name][rows]
     if values.dtype.kind != "U":
-        return np.array(values.tolist(), dtype=np.float64)
+        try:
+            return np.array(values.tolist(), dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise ValueError(f"{name} must be numbers: {error}") from error
     for row, text in enumerate(values.tolist(), rows.start):
         if NUMBER.fullmatch(text) is None:
             hint = "is a field missing?" if row else "does the first row name the columns? Then leave out --columns"

@@ -12,6 +12,8 @@ from __future__ import annotations
 
 import json
 import os
+from dataclasses import replace
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Final
 
@@ -52,45 +54,50 @@ def read_lerobot(root: str | os.PathLike[str], columns: Columns) -> tuple[list[R
         raise ValueError(f"{root} has format {version[:20]}, v2.1 and v3 can be read; lerobot converts older formats")
     features = info.get("features", {})
     entries = {name: _entries(feature) for name, feature in features.items()}
-    homes = {name: _home(root, name, entries) for name in columns.plain if name not in features}
+
+    named = {
+        part: [_found(name, entries) for name in getattr(columns, part)] for part in ("joints", "outcome", "context")
+    }
+    columns = replace(columns, **{part: tuple(names) for part, names in named.items()})
+    for name in columns.plain:
+        if name not in features:
+            known = [*entries, *(each for names in entries.values() for each in names)]
+            near = " or ".join(get_close_matches(name, known, 3, 0.0))
+            raise ValueError(f"{root} has no feature {name}; did you mean {near}? It has {', '.join(features)}")
     files = sorted((root / "data").glob("*/*.parquet"))
     if not files:
         raise ValueError(f"{root} has no data/chunk-000/*.parquet; were only its videos copied?")
-    stored = list(dict.fromkeys(homes.get(name, name) for name in columns.plain))
-    parts = [_columns(file, stored) for file in files]
-    table = {name: np.concatenate([part[name] for part in parts]) for name in stored}
-    table |= {name: table[home][:, entries[home].index(name)] for name, home in homes.items()}
-    rows = len(table[stored[0]])
+    parts = [_columns(file, columns.plain) for file in files]
+    table = {name: np.concatenate([part[name] for part in parts]) for name in columns.plain}
+    rows = len(table[columns.plain[0]])
     found = recordings(Table(root.name, table, range(rows), entries), columns)
     for what, said, read in (("frames", "total_frames", rows), ("episodes", "total_episodes", len(found))):
         if columns.recording == "episode_index" and info.get(said) != read:
             raise ValueError(f"{root} says {info.get(said)} {what}, but {read} were found; is a file missing?")
     robot = str(info.get("robot_type"))
-    records = "records degrees or shares of a joint's range (-100..100, the gripper 0..100)"
+    records = "records degrees or shares of a joint's range, -100..100, and of the gripper 0..100"
     return found, f"a robot {robot} {records}" if any(name in robot for name in _OF_ITS_RANGE) else ""
 
 
 def _entries(feature: Any) -> list[str]:
     """Names of the entries of a feature; a list of names may lie in a list, or under a name."""
     names = feature.get("names") if isinstance(feature, dict) else None
+    if not isinstance(names, list | dict):
+        return []
     if isinstance(names, dict):  # {"motors": [names]}, or {name: number}
         names = [each if isinstance(each, list) else name for name, each in names.items()]
-    flat = [name for each in names or [] for name in (each if isinstance(each, list) else [each])]
-    return flat if flat and feature["shape"] == [len(flat)] else []
+    flat = [str(name) for each in names for name in (each if isinstance(each, list) else [each])]
+    return flat if flat and feature.get("shape") == [len(flat)] else []
 
 
-def _home(root: Path, name: str, entries: dict[str, list[str]]) -> str:
-    """The feature that has an entry ``name``."""
-    homes = [feature for feature, names in entries.items() if name in names]
-    if STATE in homes or len(homes) == 1:
-        return STATE if STATE in homes else homes[0]
-    if homes:
-        number = entries[homes[0]].index(name)
-        raise ValueError(f"{name} is an entry of {' and of '.join(homes)}; write {homes[0]}[{number}], for example")
-    more = ", ".join(entries.get(STATE, ()))
-    raise ValueError(
-        f"{root} has no feature {name}; it has {', '.join(entries)}" + f"; {STATE} has {more}" * bool(more)
-    )
+def _found(name: str, entries: dict[str, list[str]]) -> str:
+    """``feature[k]`` for the name of an entry; another name is left alone."""
+    homes = {feature: f"{feature}[{names.index(name)}]" for feature, names in entries.items() if name in names}
+    if name in entries or not homes:
+        return name
+    if STATE not in homes and len(homes) > 1:
+        raise ValueError(f"{name} is an entry of several features; write {' or '.join(homes.values())}")
+    return homes.get(STATE, next(iter(homes.values())))
 
 
 def _info(root: Path) -> dict[str, Any]:

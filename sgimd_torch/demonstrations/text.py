@@ -66,6 +66,10 @@ def _table(file: Path, columns: Columns) -> Table:
     mark = max(";\t, ", key=lambda mark: _numbers_of(_split(lines[:_SAMPLE], mark)))
     rows, numbers = _split(lines, mark), [number for number, _ in numbered]
     heads = list(columns.heads)
+    if rows and rows[0] == [str(k) for k in range(len(rows[0]))]:
+        raise ValueError(
+            f"its first row, {mark.join(rows[0])}, may number the columns; delete it, or write 0.0 in a sample"
+        )
     if not heads and rows and _all_numbers(rows[0]):
         (heads,) = _split([line.lstrip("#% ") for _, line in remark], mark) or [[]]
         if len(heads) != len(rows[0]):

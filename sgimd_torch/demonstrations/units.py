@@ -54,13 +54,14 @@ def in_units(
     for k, name in enumerate(joints):
         unit, match = said.get(name, ""), _RANGE.fullmatch(said.get(name, ""))
         if not unit:
-            most = max((np.abs(each.shown.trajectory[:, k]).max(), each.name) for each in usable if each.shown)
-            high = _TURN if ranges is None else max(_TURN, ranges.high[k], -ranges.low[k])
-            why = doubt or f"{name} reads up to {most[0]:.4g} in {most[1]}, more than a turn in rad" * bool(
-                most[0] > high
-            )
-            if why:
-                raise ValueError(f"{why}; say its unit: --unit {name}=deg, or rad, or a range such as -100:100")
+            most, where = max((np.abs(each.shown.trajectory[:, k]).max(), each.name) for each in usable if each.shown)
+            if doubt:
+                raise ValueError(f"{doubt}; say all units, for example --unit deg,{joints[-1].partition('.')[0]}=0:100")
+            if most > (_TURN if ranges is None else max(_TURN, ranges.high[k], -ranges.low[k])):
+                raise ValueError(
+                    f"{name} reads up to {most:.4g} in {where}, more than a turn in rad; say its unit: --unit {name}=deg, "
+                    "or rad, or a range such as -100:100"
+                )
         elif unit == "deg":
             scales[k] = np.pi / 180
         elif match is not None and float(match[1]) < float(match[2]):
