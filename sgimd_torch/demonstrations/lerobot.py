@@ -55,10 +55,10 @@ def read_lerobot(root: str | os.PathLike[str], columns: Columns) -> tuple[list[R
     features = info.get("features", {})
     entries = {name: _entries(feature) for name, feature in features.items()}
 
-    named = {
-        part: [_found(name, entries) for name in getattr(columns, part)] for part in ("joints", "outcome", "context")
-    }
-    columns = replace(columns, **{part: tuple(names) for part, names in named.items()})
+    joints, outcome, context = (
+        tuple(_found(name, entries) for name in names) for names in (columns.joints, columns.outcome, columns.context)
+    )
+    columns = replace(columns, joints=joints, outcome=outcome, context=context)
     for name in columns.plain:
         if name not in features:
             known = [*entries, *(each for names in entries.values() for each in names)]

@@ -59,8 +59,8 @@ def in_units(
                 raise ValueError(f"{doubt}; say all units, for example --unit deg,{joints[-1].partition('.')[0]}=0:100")
             if most > (_TURN if ranges is None else max(_TURN, ranges.high[k], -ranges.low[k])):
                 raise ValueError(
-                    f"{name} reads up to {most:.4g} in {where}, more than a turn in rad; say its unit: --unit {name}=deg, "
-                    "or rad, or a range such as -100:100"
+                    f"{name} reads up to {most:.4g} in {where}, more than a turn in rad; say its unit: "
+                    f"--unit {name}=deg, or rad, or a range such as -100:100"
                 )
         elif unit == "deg":
             scales[k] = np.pi / 180

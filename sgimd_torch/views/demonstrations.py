@@ -39,7 +39,7 @@ from sgimd_torch.demonstrations.text import read_text
 from sgimd_torch.demonstrations.units import in_units, paced
 from sgimd_torch.environments.protocol import SimulationError, execute_many, primitive_of
 from sgimd_torch.runs.build import task_of
-from sgimd_torch.runs.command_line import ALONE, parse
+from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.process import parser_of, say
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.runs.tasks.taught import Replaying, theta_of
@@ -137,7 +137,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         raise FileNotFoundError(f"there is no {options.source}")
     task = None
     if options.environment:
-        task = task_of(parse([f"--environment={options.environment}", f"--algorithm={ALONE}", *of_robot])[0])
+        task = task_of(parse([f"--environment={options.environment}", *of_robot])[0])
     elif of_robot:
         raise ValueError(f"{of_robot[0]} is no option of sgimd demonstrations import, or needs --environment")
     found = read(options, primitive_of(task.environment).ranges if task else None)
