@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -45,8 +45,6 @@ class Columns:
     heads: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        if not self.joints:
-            raise ValueError("name at least one column for joints")
         for name in self.names:
             if _NAME.fullmatch(name) is None:
                 raise ValueError(f"{name!r} does not name a column; write, for example, state, state[2] or state[0:6]")
@@ -80,11 +78,10 @@ class Recording(NamedTuple):
     refused: str = ""
 
 
-@dataclass(frozen=True)
-class Table:
+class Table(NamedTuple):
     """Columns of a file.
 
-    Args:
+    Attributes:
         name: name of the file in messages.
         columns: ``(n_rows,)`` values or texts, or ``(n_rows, k)`` vectors, for each name in ``Columns.plain``.
         rows: number of each row in messages.
@@ -94,7 +91,7 @@ class Table:
     name: str
     columns: Mapping[str, np.ndarray]
     rows: Sequence[int]
-    entries: Mapping[str, Sequence[str]] = field(default_factory=dict[str, Sequence[str]])
+    entries: Mapping[str, Sequence[str]]
 
 
 def recordings(table: Table, columns: Columns) -> list[Recording]:

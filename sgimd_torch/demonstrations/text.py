@@ -92,7 +92,7 @@ def _table(file: Path, columns: Columns) -> Table:
         raise ValueError(
             "it has decimal commas beside points, or beside commas between columns; do they mark thousands?"
         )
-    return Table(file.name, found, numbers)
+    return Table(file.name, found, numbers, {})
 
 
 def _split(lines: Sequence[str], mark: str) -> Rows:

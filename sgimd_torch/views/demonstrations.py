@@ -166,37 +166,35 @@ def read(options: argparse.Namespace, ranges: Box | None) -> list[Recording]:
         ValueError: the source is damaged, or names or units of its columns are missing.
         OSError: the source cannot be read.
     """
-    source: Path = options.source
+    source, units, doubt = options.source, options.unit, ""
+    is_dataset = any((source / folder).is_dir() for folder in ("meta", "meta_data")) or source.suffix == ".parquet"
     if source.suffix == ".npz":
-        return [Recording(str(row), each) for row, each in enumerate(load_demonstrations(source))]
-    is_dataset = any((source / folder).is_dir() for folder in ("meta", "meta_data"))
-    joints = options.joints or (ranges.names if ranges is not None else ())
-    if not joints:
-        raise ValueError(f"{source} is no .npz file, so name its columns of joints: --joints COLUMN,COLUMN")
-    if not options.outcome and not options.environment:
-        raise ValueError(
-            f"{source} needs outcomes: name their columns with --outcome COLUMN,COLUMN, or name a robot with "
-            "--environment, which then executes the recordings"
-        )
-    columns = Columns(
-        joints,
-        options.outcome,
-        options.context,
-        options.time or ("timestamp" if is_dataset else "time"),
-        options.recording or ("episode_index" if is_dataset else None),
-        options.rate,
-        options.columns,
-    )
-    doubt = ""
-    if is_dataset or source.suffix == ".parquet":
+        shown = load_demonstrations(source)
+        names = tuple(f"joint {k}" for k in range(shown[0].trajectory.shape[1]))
+        found = [Recording(str(row), each, names) for row, each in enumerate(shown)]
+        units = {"": "rad", **units}
+    elif is_dataset:
         from sgimd_torch.demonstrations.lerobot import read_lerobot  # loads pyarrow, an optional dependency
 
-        found, doubt = read_lerobot(source, columns)
+        found, doubt = read_lerobot(source, _columns(options, ranges, "timestamp", "episode_index"))
     else:
-        found = read_text(source, columns)
-    return [
-        paced(each, options.speed, trim=options.trim) for each in in_units(found, options.unit, ranges, doubt=doubt)
-    ]
+        found = read_text(source, _columns(options, ranges, "time", None))
+    found = in_units(found, units, ranges, doubt=doubt)
+    return [paced(each, options.speed, trim=options.trim) for each in found]
+
+
+def _columns(options: argparse.Namespace, ranges: Box | None, time: str, recording: str | None) -> Columns:
+    """The columns that the options name; ``time`` and ``recording`` are defaults."""
+    joints = options.joints or (ranges.names if ranges is not None else ())
+    if not joints:
+        raise ValueError(f"{options.source} is no .npz file, so name its columns of joints: --joints COLUMN,COLUMN")
+    if not options.outcome and not options.environment:
+        raise ValueError(
+            f"{options.source} needs outcomes: name their columns with --outcome COLUMN,COLUMN, or name a robot with "
+            "--environment, which then executes the recordings"
+        )
+    times, divided = options.time or time, options.recording or recording
+    return Columns(joints, options.outcome, options.context, times, divided, options.rate, options.columns)
 
 
 def check(task: Task, shown: Demonstration, row: int) -> Checked:
