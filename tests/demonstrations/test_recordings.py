@@ -383,11 +383,11 @@ def test_check_says_where_each_lands(tmp_path, capsys):
 
 
 def test_check_says_whose_movement_has_no_outcome(tmp_path, capsys, monkeypatch):
-    def execute_many(self, contexts, thetas, rngs):
+    def execute(self, context, theta, rng):
         raise SimulationError("it hit the table")
 
     save_demonstrations(tmp_path / "shown.npz", [led(0.1, lands(0.1))])
-    monkeypatch.setattr(PlanarArm, "execute_many", execute_many)
+    monkeypatch.setattr(PlanarArm, "execute", execute)
     assert sgimd("check", tmp_path / "shown.npz", "--environment", "planar-arm-7") == 2
     assert "cannot be used: it hit the table" in capsys.readouterr().out
 
