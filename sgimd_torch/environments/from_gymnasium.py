@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from copy import deepcopy
-from typing import Any
+from functools import cached_property
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,13 +25,15 @@ try:
 except ImportError as error:
     raise ImportError(f"this environment needs gymnasium: pip install 'sgimd-torch[gym]' ({error})") from error
 
+STARTS: Final = 1000  # number of different starts, where the start is the context
+
 
 class FromGymnasium:
     """An environment of this library that plays episodes of a gymnasium environment.
 
     Each episode is reset with a seed drawn from ``rng``. So the random start of an episode counts as noise, or, with
-    ``context``, as the context: this can be seen and not set, so only an observed context can be executed. Only one
-    thread at a time may use the environment. After a warning MuJoCo resets its state, so a warning raises
+    ``context``, as the context: this can be seen and not set, so only a context of one of the `STARTS` can be executed.
+    Only one thread at a time may use the environment. After a warning MuJoCo resets its state, so a warning raises
     ``SimulationError``.
 
     Args:
@@ -89,7 +92,6 @@ class FromGymnasium:
                 f"gymnasium.make(..., max_episode_steps={self.steps}), or choose fewer steps"
             )
         self._outcome, self._context = outcome, context
-        self._seeds = dict[bytes, int]()  # seed of the reset, by observed context
 
     def observe(self, rng: np.random.Generator) -> Array:
         """``(context_dim,)``, the context of a random start of an episode; it is empty if the start counts as noise.
@@ -100,17 +102,13 @@ class FromGymnasium:
         check_rng(rng)
         if self._context is None:
             return self.contexts.sample(rng)
-        seed = _seed(rng)
-        first, _ = self.world.reset(seed=seed)
-        seen = check_point("context", np.array(self._context(first), dtype=np.float64), self.contexts.dim)
-        self._seeds[seen.tobytes()] = seed
-        return seen
+        return self._seen(int(rng.integers(STARTS)))
 
     def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
         """``(outcome_dim,)``, the outcome of one episode.
 
         Raises:
-            ValueError: ``theta`` is not one point of Pi, ``context`` was never observed, or the function ``outcome``
+            ValueError: ``theta`` is not one point of Pi, ``context`` is never observed, or the function ``outcome``
                 returns no outcome.
             TypeError: ``rng`` is not a Generator.
             SimulationError: MuJoCo gave a warning, or the outcome is not finite.
@@ -120,7 +118,7 @@ class FromGymnasium:
         seed = _seed(rng) if self._context is None else self._seeds.get(context.tobytes())
         if seed is None:
             raise ValueError(
-                f"context {context.tolist()} was never observed: the start of an episode can be seen, not set; give a "
+                f"context {context.tolist()} is never observed: the start of an episode can be seen, not set; give a "
                 "context from observe()"
             )
         actions = self.controller.at(theta, self.dt * np.arange(self.steps, dtype=np.float64))
@@ -142,6 +140,17 @@ class FromGymnasium:
         even = self.dt * np.arange(round((times[-1] - times[0]) / self.dt) + 1, dtype=np.float64)
         played = np.stack([np.interp(even, times - times[0], column) for column in actions.T], axis=1)
         return self._play(played, _seed(stream(0, "replay")), played[-1])
+
+    def _seen(self, seed: int) -> Array:
+        """The context of the start with this ``seed``."""
+        assert self._context is not None
+        first, _ = self.world.reset(seed=seed)
+        return check_point("context", np.array(self._context(first), dtype=np.float64), self.contexts.dim)
+
+    @cached_property
+    def _seeds(self) -> dict[bytes, int]:
+        """The first seed of each context, alike in all processes and after ``--resume``."""
+        return {self._seen(seed).tobytes(): seed for seed in reversed(range(STARTS))}
 
     def _play(self, actions: Array, seed: int, theta: Array, rng: np.random.Generator | None = None) -> Array:
         """The outcome of an episode of these ``actions``; a `SimulationError` names ``theta``.
