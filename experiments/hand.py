@@ -12,11 +12,12 @@ from typing import Final
 
 import numpy as np
 
+from sgimd_torch.demonstrations.units import moving
 from sgimd_torch.runs.tasks.rods import fishing_rod
 from sgimd_torch.spaces import Array, stream
 from sgimd_torch.teach.leading import Leading
 from sgimd_torch.teach.led import hand_led_of
-from sgimd_torch.teach.lessons import HandLesson, lesson_by_hand, moving
+from sgimd_torch.teach.lessons import HandLesson, lesson_by_hand
 
 LESSONS: Final = 10
 SEED: Final = 2014  # seed of the hand; all learners get the same lessons

@@ -55,7 +55,7 @@ def main() -> None:
     shown = []
     for _ in tqdm(range(options.candidates), desc="recording"):
         torques = wave(rng, times)
-        shown.append(Demonstration(np.zeros(0), times, torques, still.replay(torques)))
+        shown.append(Demonstration(np.zeros(0), times, torques, still.replay(times, torques)))
     chosen = farthest_points(np.stack([each.outcome for each in shown]), options.n)
     save_demonstrations(options.out / "swimmer_demonstrations.npz", [shown[row] for row in chosen])
 

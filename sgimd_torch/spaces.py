@@ -156,8 +156,16 @@ class Box:
         low, high = np.array(self.low, dtype=np.float64), np.array(self.high, dtype=np.float64)
         if low.ndim != 1 or low.shape != high.shape:
             raise ValueError(f"Box needs two corners of shape (dim,), got {low.shape} and {high.shape}")
-        if not (np.isfinite(low).all() and np.isfinite(high).all() and (low < high).all()):
-            raise ValueError(f"Box needs finite corners with low < high, got {low} and {high}; were they swapped?")
+        endless = np.flatnonzero(~np.isfinite(low) | ~np.isfinite(high))
+        if len(endless):
+            k = endless[0]
+            more = f" (and {len(endless) - 1} more)" if len(endless) > 1 else ""
+            raise ValueError(
+                f"Box needs finite corners, but dimension {k} is [{low[k]}, {high[k]}]{more}; is it a space without "
+                "bounds, for example of actions? Choose bounds for it"
+            )
+        if not (low < high).all():
+            raise ValueError(f"Box needs corners with low < high, got {low} and {high}; were they swapped?")
         given: Any = self.names
         names = tuple(given)
         texts = all(isinstance(each, str) for each in (*names, self.unit))

@@ -79,9 +79,12 @@ COMMANDS = {
     "film nowhere": "nowhere holds no run; runs are in OUT/NAME/seed-000",
     "benchmark nowhere --out goals.txt": "--out must be a .npz file in a folder that exists, got goals.txt",
     "check toss:make": "toss has no make",
-    "demonstrations check shown.csv --task planar-arm-7": "shown.csv is no .npz file, so name its columns",
-    f"demonstrations check shown.csv --task rod-wind {COLUMNS}": r"context \(wind \(N\)\); name .* --context",
-    f"demonstrations check nul.csv --task planar-arm-7 {COLUMNS}": "nul.csv has a NUL",
+    "demonstrations check shown.csv --environment planar-arm-7": "shown.csv is no .npz file, so name its columns",
+    f"demonstrations check shown.csv --environment rod-wind {COLUMNS}": "robot has 6 joints, .* have 2: q0, q1",
+    "demonstrations check shown.csv --environment rod-wind --joints q0,q1,q0,q1,q0,q1 --outcome x,y": (
+        r"context \(wind \(N\)\); name .* --context"
+    ),
+    f"demonstrations check nul.csv --environment planar-arm-7 {COLUMNS}": "nul.csv cannot be used: it has a NUL",
     f"demonstrations import shown.csv {COLUMNS} --out shown.txt": "--out must end in .npz, got shown.txt",
     "suite --environment toss": "--environment cannot be given here: each task has its own",
     "run --algorithm random --budget 5": "--budget: algorithm random has no such option",
@@ -133,7 +136,7 @@ COMMANDS = {
     "demo --seed -1": "seed must be",
     "demo --movements 0": "movements must be",
     "demo --evaluate_at []": "--evaluate-at",
-    "demonstrations check nothing.npz --task planar-arm-7": "there is no nothing.npz",
+    "demonstrations check nothing.npz --environment planar-arm-7": "there is no nothing.npz",
     "demo --algorithm random": "--algorithm cannot be given here",
 }
 MANY_RUNS = {  # what these say is longer: their usage, or the list of runs, comes first

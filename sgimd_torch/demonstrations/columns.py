@@ -1,26 +1,24 @@
 """Recordings from tables: each row is a sample of a recording, and the user names the columns.
 
     columns = Columns(joints=("shoulder", "elbow"), outcome=("x", "y"))
-    shown = read_csv("recordings", columns)              # a folder with a file for each recording, or one long table
-    save_demonstrations("shown.npz", shown)
+    found = read_text("recordings", columns)      # of text.py: a folder with a file for each recording, or one table
+    found = in_units(found, {"": "deg"})          # of units.py: joints in rad
 A column may hold vectors, as in LeRobot: ``observation.state`` is the whole vector, ``observation.state[0:6]`` and
 ``observation.state[2]`` are some of its entries.
 """
 
 from __future__ import annotations
 
-import csv
-import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from sgimd_torch.spaces import Array, Demonstration, check_vector
 
+NUMBER: Final = re.compile(r"[+-]?(\d+(\.\d*|,\d+)?|[.,]\d+)([eE][+-]?\d+)?")
 _NAME: Final = re.compile(r"(?P<name>[^\[\]]+)(\[(?P<first>\d+)(?P<slice>:(?P<end>\d+)?)?\])?")
 
 
@@ -29,24 +27,24 @@ class Columns:
     """Names of the columns of a table.
 
     Args:
-        joints: columns of joint angles (rad) or of motor commands, in the order of the robot's correspondence.
-        outcome: columns of the outcome, read in the last row of a recording.
+        joints: columns of joint angles or of motor commands, in the order of the robot's correspondence.
+        outcome: columns of the outcome, read in the last row of a recording; () if the table has no outcome.
         context: columns of the context, read in the first row of a recording; () for a robot without contexts.
         time: column of the time (s); the first time of a recording counts as 0.
         recording: column with the number or name of the recording of each row; None: a table is one recording.
-        degrees: whether joint angles in the table are in degrees; they are converted to rad.
+        rate: samples per second of a table without times; None if ``time`` has the times.
+        heads: names of all columns of a text without names; () if its first row has the names.
     """
 
     joints: tuple[str, ...]
-    outcome: tuple[str, ...]
+    outcome: tuple[str, ...] = ()
     context: tuple[str, ...] = ()
     time: str = "time"
     recording: str | None = None
-    degrees: bool = False
+    rate: float | None = None
+    heads: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        if not self.joints or not self.outcome:
-            raise ValueError("name at least one column for joints and one for outcome")
         for name in self.names:
             if _NAME.fullmatch(name) is None:
                 raise ValueError(f"{name!r} does not name a column; write, for example, state, state[2] or state[0:6]")
@@ -54,8 +52,9 @@ class Columns:
     @property
     def names(self) -> tuple[str, ...]:
         """All columns as the user wrote them, with entries in brackets."""
+        timed = (self.time,) if self.rate is None else ()
         grouped = () if self.recording is None else (self.recording,)
-        return (*self.joints, *self.outcome, *self.context, self.time, *grouped)
+        return (*self.joints, *self.outcome, *self.context, *timed, *grouped)
 
     @property
     def plain(self) -> list[str]:
@@ -63,102 +62,124 @@ class Columns:
         return list(dict.fromkeys(name.partition("[")[0] for name in self.names))
 
 
-def read_csv(path: str | os.PathLike[str], columns: Columns) -> list[Demonstration]:
-    """Read recordings from a CSV file, or from all CSV files of a folder in the order of their names.
+class Recording(NamedTuple):
+    """A recording that was read from a file, or the reason why it cannot be used.
 
-    The first line of a file names its columns. A file is one recording unless ``columns.recording`` divides it.
+    Attributes:
+        name: name of the recording, with the name of its file.
+        shown: the recording; its outcome is empty if the file has none. None if the recording cannot be used.
+        joints: names of the joints.
+        refused: reason why the recording cannot be used, "" if it can.
+    """
+
+    name: str
+    shown: Demonstration | None
+    joints: tuple[str, ...] = ()
+    refused: str = ""
+
+
+class Table(NamedTuple):
+    """Columns of a file.
+
+    Attributes:
+        name: name of the file in messages.
+        columns: ``(n_rows,)`` values or texts, or ``(n_rows, k)`` vectors, for each name in ``Columns.plain``.
+        rows: number of each row in messages.
+        entries: names of the entries of a vector, by column.
+    """
+
+    name: str
+    columns: Mapping[str, np.ndarray]
+    rows: Sequence[int]
+    entries: Mapping[str, Sequence[str]]
+
+
+def recordings(table: Table, columns: Columns) -> list[Recording]:
+    """The recordings of one table. A fault of one recording is told in its ``refused``, with the row.
 
     Raises:
-        ValueError: a column is missing, a field is not a number, or `recordings` refuses the rows; the message names
-            the file, and the row or recording.
-        OSError: there is no file.
+        ValueError: the rows of a recording are not adjacent.
     """
-    path = Path(path)
-    files = sorted(path.glob("*.csv")) if path.is_dir() else [path]
-    if not files:
-        raise ValueError(f"{path} holds no .csv file")
-    return [each for file in files for each in recordings(str(file), _table(file, columns.plain), columns)]
-
-
-def recordings(source: str, table: Mapping[str, np.ndarray], columns: Columns) -> list[Demonstration]:
-    """The recordings of one table.
-
-    Args:
-        source: name of the table in error messages.
-        table: ``(n_rows,)`` values or ``(n_rows, k)`` vectors for each name in ``columns.plain``.
-        columns: meaning of the columns.
-
-    Raises:
-        ValueError: a vector lacks an entry, or a recording has fewer than two samples, rows that are not adjacent, or
-            times that do not increase.
-    """
-    times = _values(source, table, (columns.time,))
-    if times.shape[1] != 1:
-        raise ValueError(f"{source}: {columns.time} must be one number for each row, got {times.shape[1]}")
-    joints = _values(source, table, columns.joints)
-    joints = np.deg2rad(joints) if columns.degrees else joints
-    outcomes, contexts = _values(source, table, columns.outcome), _values(source, table, columns.context)
-    found: list[Demonstration] = []
-    for what, rows in _groups(source, table, columns.recording, len(times)):
-        since = times[rows, 0] - times[rows.start, 0]
-        if len(since) < 2:
-            raise ValueError(f"{what} has 1 sample, but needs 2 or more; does {columns.recording} number the rows?")
-        if not (np.diff(since) > 0).all():
-            raise ValueError(f"{what}: {columns.time} must increase from row to row; were the rows shuffled?")
-        found.append(Demonstration(contexts[rows.start], since, joints[rows], outcomes[rows.stop - 1]))
+    found = []
+    for name, rows in _groups(table, columns.recording):
+        try:
+            joints, names = _values(table, columns.joints, rows)
+            (outcome, _), (context, _) = (_values(table, each, rows) for each in (columns.outcome, columns.context))
+            if len(joints) < 2:
+                raise ValueError(f"it has 1 sample, but needs 2 or more; does {columns.recording} number the rows?")
+            shown = Demonstration(context[0], _times(table, columns, rows), joints, outcome[-1])
+            found.append(Recording(name, shown, tuple(names)))
+        except ValueError as error:
+            found.append(Recording(name, None, refused=str(error)))
     return found
 
 
-def _table(file: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
-    """Columns of a CSV file, as arrays of text."""
-    with open(file, encoding="utf-8-sig", errors="replace", newline="") as text:
-        lines = text.readlines()
-    if any("\0" in line for line in lines):
-        raise ValueError(f"{file} has a NUL, so it is no text in UTF-8; was it saved as UTF-16, or cut off by a crash?")
-    heads, *rows = [[field.strip() for field in row] for row in csv.reader(lines) if row] or [[]]
-    missing = [name for name in names if name not in heads]
-    if missing:
-        raise ValueError(f"{file} has no column {', '.join(missing)}; it has {', '.join(heads[:20])}")
-    if not rows:
-        raise ValueError(f"{file} has no rows below the names of its columns")
-    for number, row in enumerate(rows, 1):
-        if len(row) != len(heads):
-            raise ValueError(f"{file}: row {number} has {len(row)} fields instead of {len(heads)}; is it cut short?")
-    return {name: np.array([row[heads.index(name)] for row in rows]) for name in names}
+def _times(table: Table, columns: Columns, rows: slice) -> Array:
+    """``(n_samples,)`` s, from 0."""
+    if columns.rate is not None:
+        return np.arange(rows.stop - rows.start) / columns.rate
+    times, _ = _values(table, (columns.time,), rows)
+    if times.shape[1] != 1:
+        raise ValueError(f"{columns.time} must be one number for each row, got {times.shape[1]}")
+    falls = np.flatnonzero(np.diff(times[:, 0]) <= 0)
+    if len(falls):
+        row = rows.start + falls[0] + 1
+        raise ValueError(f"row {table.rows[row]}: {columns.time} must increase from row to row; were rows shuffled?")
+    return times[:, 0] - times[0, 0]
 
 
-def _values(source: str, table: Mapping[str, np.ndarray], names: Sequence[str]) -> Array:
-    """``(n_rows, dim)`` values of the columns ``names``, side by side."""
-    parts = [np.empty((len(next(iter(table.values()))), 0))]
+def _values(table: Table, names: Sequence[str], rows: slice) -> tuple[Array, list[str]]:
+    """``(n_samples, dim)`` values of the columns ``names``, side by side, and the name of each dimension."""
+    parts, labels = [np.empty((rows.stop - rows.start, 0))], list[str]()
     for written in names:
         match = _NAME.fullmatch(written)
         assert match is not None
-        try:
-            values = np.array(table[match["name"]].tolist(), dtype=np.float64)
-        except ValueError as error:
-            raise ValueError(f"{source}: {match['name']} must be numbers: {error}; is a field missing?") from error
+        name = match["name"]
+        values = _numbers(table, name, rows)
         vectors = values.reshape(len(values), -1)
+        plain = [name] if values.ndim == 1 else [f"{name}[{k}]" for k in range(vectors.shape[1])]
+        called = table.entries.get(name) or plain
+        first, end = int(match["first"] or 0), vectors.shape[1]
         if match["first"] is not None:
-            first = int(match["first"])
-            end = first + 1 if match["slice"] is None else int(match["end"] or vectors.shape[1])
-            if not first < end <= vectors.shape[1]:
-                raise ValueError(f"{source}: there is no {written}: {match['name']} has {vectors.shape[1]} entries")
-            vectors = vectors[:, first:end]
-        parts.append(check_vector(f"{source}: {written}", vectors, vectors.shape[1]))
-    return np.concatenate(parts, axis=1)
+            end = first + 1 if match["slice"] is None else int(match["end"] or end)
+        if not first < end <= vectors.shape[1]:
+            raise ValueError(f"there is no {written}: {name} has {vectors.shape[1]} entries")
+        part = vectors[:, first:end]
+        usable = np.isfinite(part).all(axis=1)
+        if not usable.all():
+            row = int(usable.argmin())
+            raise ValueError(f"row {table.rows[rows.start + row]}: {written} must be finite, got {part[row].tolist()}")
+        parts.append(check_vector(written, part, part.shape[1]))
+        labels += called[first:end]
+    return np.concatenate(parts, axis=1), labels
 
 
-def _groups(source: str, table: Mapping[str, np.ndarray], recording: str | None, n: int) -> list[tuple[str, slice]]:
-    """Pairs (name for error messages, rows), one for each recording, in order."""
+def _numbers(table: Table, name: str, rows: slice) -> Array:
+    values = table.columns[name][rows]
+    if values.dtype.kind != "U":
+        try:
+            return np.array(values.tolist(), dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise ValueError(f"{name} must be numbers: {error}") from error
+    for row, text in enumerate(values.tolist(), rows.start):
+        if NUMBER.fullmatch(text) is None:
+            hint = "is a field missing?" if row else "does the first row name the columns? Then leave out --columns"
+            raise ValueError(f"row {table.rows[row]}: {name} is {text[:40]!r}, no number; {hint}")
+    return np.array([float(text.replace(",", ".")) for text in values.tolist()])
+
+
+def _groups(table: Table, recording: str | None) -> list[tuple[str, slice]]:
+    """Pairs (name for messages, rows), one for each recording, in order."""
+    n = len(table.rows)
     if recording is None:
-        return [(source, slice(0, n))]
-    names = table[recording].tolist()
+        return [(table.name, slice(0, n))]
+    names = table.columns[recording].tolist()
     starts = [row for row in range(n) if row == 0 or names[row] != names[row - 1]]
     found = [names[row] for row in starts]
     if len(set(found)) < len(found):
         twice = next(name for name in found if found.count(name) > 1)
-        raise ValueError(f"{source}: the rows of recording {twice} are not adjacent; sort them by {recording} and time")
+        raise ValueError(f"the rows of recording {twice} are not adjacent; sort them by {recording} and time")
     return [
-        (f"{source}: recording {names[row]}", slice(row, end))
+        (f"{table.name}: {recording} {names[row]}", slice(row, end))
         for row, end in zip(starts, [*starts[1:], n], strict=True)
     ]

@@ -33,7 +33,8 @@ def beyond_limits(environment: Environment, shown: Demonstration) -> list[str]:
         outside = (shown.trajectory < box.low) | (shown.trajectory > box.high)
         for joint in np.flatnonzero(outside.any(axis=0)):
             sample = int(outside[:, joint].argmax())
-            found = f"joint {joint} is {shown.trajectory[sample, joint]:.3g} at sample {sample}"
+            name = box.names[joint] if box.names else f"joint {joint}"
+            found = f"{name} is {shown.trajectory[sample, joint]:.3g} at sample {sample}"
             remarks.append(f"{found}, outside its range [{box.low[joint]:g}, {box.high[joint]:g}]")
     shortest, longest = primitive.durations
     lasts = float(shown.times[-1] - shown.times[0])

@@ -1,23 +1,26 @@
-"""Recordings from a LeRobot dataset (format v3) on disk; videos are not read.
+"""Recordings from a LeRobot dataset (format v2.1 or v3) on disk; videos are not read.
 
     columns = Columns(joints=("observation.state[0:6]",), outcome=("observation.environment_state[0:2]",),
                       time="timestamp", recording="episode_index")
-    shown = read_lerobot("datasets/my_arm", columns)
-``meta/info.json`` has the version, the counts and the features. ``data/chunk-000/file-000.parquet`` and further files
-have a row for each frame; one file may hold several episodes.
+    found, doubt = read_lerobot("datasets/my_arm", columns)
+``meta/info.json`` has the version, the counts and the features. ``data/chunk-000/*.parquet`` and further folders have
+a row for each frame; a file of v3 may hold several episodes. The name of an entry, such as ``gripper.pos``, is a
+column, too; if several features have such an entry, that of ``observation.state`` is meant.
 """
 
 from __future__ import annotations
 
 import json
 import os
+from dataclasses import replace
+from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
-from sgimd_torch.demonstrations.columns import Columns, recordings
-from sgimd_torch.spaces import Demonstration
+from sgimd_torch.demonstrations.columns import Columns, Recording, Table, recordings
+from sgimd_torch.demonstrations.text import POINTER
 
 try:
     import pyarrow
@@ -25,54 +28,96 @@ try:
 except ImportError as error:
     raise ImportError(f"a LeRobot dataset needs pyarrow: pip install 'sgimd-torch[lerobot]' ({error})") from error
 
+STATE: Final = "observation.state"
+_OF_ITS_RANGE: Final = ("so100", "so101", "koch", "lekiwi")  # robots that record shares of the ranges of joints
 
-def read_lerobot(root: str | os.PathLike[str], columns: Columns) -> list[Demonstration]:
-    """Read all episodes of a dataset, in order.
+
+def read_lerobot(root: str | os.PathLike[str], columns: Columns) -> tuple[list[Recording], str]:
+    """All episodes of a dataset in order, and the reason to doubt that they are in rad ("": none).
 
     Args:
         root: folder of the dataset, with ``meta`` and ``data``.
-        columns: names of features; usually the time is ``timestamp``, and the recording is ``episode_index``.
+        columns: names of features or entries; usually the time is ``timestamp``, the recording ``episode_index``.
 
     Raises:
-        ValueError: the folder is no dataset, has another version, lacks a feature, has not as many episodes and frames
-            as ``info.json`` says, or has an episode that `recordings` refuses.
+        ValueError: the folder is no dataset, has another version, lacks a feature, or has not as many episodes and
+            frames as ``info.json`` says.
         OSError: a file cannot be read.
     """
     root = Path(root)
-    info = _info(root / "meta" / "info.json")
+    if root.is_file():
+        whole = next((each for each in root.absolute().parents if (each / "meta").is_dir()), "its folder with meta")
+        raise ValueError(f"{root} is one file of a LeRobot dataset; name the dataset instead: {whole}")
+    info = _info(root)
     version = str(info.get("codebase_version"))
-    if not version.startswith("v3."):
-        raise ValueError(f"{root} has format {version[:20]}, this library reads v3; lerobot converts older formats")
-    missing = [name for name in columns.plain if name not in info.get("features", ())]
-    if missing:
-        raise ValueError(f"{root} has no feature {', '.join(missing)}; it has {', '.join(info.get('features', ()))}")
+    if version != "v2.1" and not version.startswith("v3."):
+        raise ValueError(f"{root} has format {version[:20]}, v2.1 and v3 can be read; lerobot converts older formats")
+    features = info.get("features", {})
+    entries = {name: _entries(feature) for name, feature in features.items()}
+
+    joints, outcome, context = (
+        tuple(_found(name, entries) for name in names) for names in (columns.joints, columns.outcome, columns.context)
+    )
+    columns = replace(columns, joints=joints, outcome=outcome, context=context)
+    for name in columns.plain:
+        if name not in features:
+            known = [*entries, *(each for names in entries.values() for each in names)]
+            near = " or ".join(get_close_matches(name, known, 3, 0.0))
+            raise ValueError(f"{root} has no feature {name}; did you mean {near}? It has {', '.join(features)}")
     files = sorted((root / "data").glob("*/*.parquet"))
     if not files:
-        raise ValueError(f"{root} has no data/chunk-000/file-000.parquet; were only its videos copied?")
+        raise ValueError(f"{root} has no data/chunk-000/*.parquet; were only its videos copied?")
     parts = [_columns(file, columns.plain) for file in files]
     table = {name: np.concatenate([part[name] for part in parts]) for name in columns.plain}
-    found = recordings(str(root), table, columns)
-    rows = len(table[columns.time])
+    rows = len(table[columns.plain[0]])
+    found = recordings(Table(root.name, table, range(rows), entries), columns)
     for what, said, read in (("frames", "total_frames", rows), ("episodes", "total_episodes", len(found))):
-        if info.get(said) != read:
+        if columns.recording == "episode_index" and info.get(said) != read:
             raise ValueError(f"{root} says {info.get(said)} {what}, but {read} were found; is a file missing?")
-    return found
+    robot = str(info.get("robot_type"))
+    records = "records degrees or shares of a joint's range, -100..100, and of the gripper 0..100"
+    return found, f"a robot {robot} {records}" if any(name in robot for name in _OF_ITS_RANGE) else ""
 
 
-def _info(path: Path) -> dict[str, Any]:
+def _entries(feature: Any) -> list[str]:
+    """Names of the entries of a feature; a list of names may lie in a list, or under a name."""
+    names = feature.get("names") if isinstance(feature, dict) else None
+    if not isinstance(names, list | dict):
+        return []
+    if isinstance(names, dict):  # {"motors": [names]}, or {name: number}
+        names = [each if isinstance(each, list) else name for name, each in names.items()]
+    flat = [str(name) for each in names for name in (each if isinstance(each, list) else [each])]
+    return flat if flat and feature.get("shape") == [len(flat)] else []
+
+
+def _found(name: str, entries: dict[str, list[str]]) -> str:
+    """``feature[k]`` for the name of an entry; another name is left alone."""
+    homes = {feature: f"{feature}[{names.index(name)}]" for feature, names in entries.items() if name in names}
+    if name in entries or not homes:
+        return name
+    if STATE not in homes and len(homes) > 1:
+        raise ValueError(f"{name} is an entry of several features; write {' or '.join(homes.values())}")
+    return homes.get(STATE, next(iter(homes.values())))
+
+
+def _info(root: Path) -> dict[str, Any]:
+    path = root / "meta/info.json"
     try:
         info = json.loads(path.read_text(encoding="utf-8"))
     except OSError:
-        raise ValueError(f"{path.parents[1]} is no LeRobot dataset: it has no meta/info.json") from None
-    except ValueError as error:
+        raise ValueError(f"{root} is no LeRobot dataset of v2.1 or v3: it has no meta/info.json") from None
+    except (ValueError, RecursionError) as error:
         raise ValueError(f"{path} is no json: {str(error)[:100]}") from error
-    if not isinstance(info, dict):
-        raise ValueError(f"{path} must hold an object, got {type(info).__name__}")
+    if not isinstance(info, dict) or not isinstance(info.get("features", {}), dict):
+        raise ValueError(f"{path} must hold an object with features, got {type(info).__name__}")
     return info
 
 
 def _columns(file: Path, names: list[str]) -> dict[str, np.ndarray]:
     """Columns of a parquet file by name, as ``(n_rows,)`` values or ``(n_rows, k)`` vectors."""
+    with open(file, "rb") as content:
+        if content.read(len(POINTER)) == POINTER.encode():
+            raise ValueError(f"{file} is a pointer of Git LFS, not the file itself; git lfs pull gets the file")
     try:
         table = pyarrow.parquet.read_table(file, columns=names, page_checksum_verification=True)
         return {name: np.array(table.column(name).to_pylist()) for name in names}

@@ -10,26 +10,31 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from copy import deepcopy
-from typing import Any
+from functools import cached_property
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from sgimd_torch.environments.controllers import Controller
-from sgimd_torch.environments.protocol import Primitive, SimulationError, check_movement, check_robot
-from sgimd_torch.spaces import Array, Box, check_count, check_point, check_rng, check_vector, stream
+from sgimd_torch.environments.protocol import Primitive, SimulationError, check_movement, check_recording, check_robot
+from sgimd_torch.spaces import Array, Box, check_count, check_point, check_rng, stream
 
 try:
     import gymnasium as gymnasium
 except ImportError as error:
     raise ImportError(f"this environment needs gymnasium: pip install 'sgimd-torch[gym]' ({error})") from error
 
+STARTS: Final = 1000  # number of different starts, where the start is the context
+
 
 class FromGymnasium:
     """An environment of this library that plays episodes of a gymnasium environment.
 
-    Each episode is reset with a seed drawn from ``rng``, so the noise comes from the random reset. Only one thread at a
-    time may use the environment. After a warning MuJoCo resets its state, so a warning raises ``SimulationError``.
+    Each episode is reset with a seed drawn from ``rng``. So the random start of an episode counts as noise, or, with
+    ``context``, as the context: this can be seen and not set, so only a context of one of the `STARTS` can be executed.
+    Only one thread at a time may use the environment. After a warning MuJoCo resets its state, so a warning raises
+    ``SimulationError``.
 
     Args:
         world: gymnasium environment with a Box of actions, with or without wrappers.
@@ -40,9 +45,12 @@ class FromGymnasium:
         steps: largest number of actions of an episode; the world may end an episode earlier.
         outcome: function (list of all observations of an episode) -> outcome ``(outcome_dim,)``.
         dt: time between two actions (s); None for the ``dt`` of the world, which MuJoCo's environments have.
+        contexts: C; None if the start of an episode counts as noise.
+        context: function (first observation of an episode) -> context ``(context_dim,)``; None without ``contexts``.
 
     Raises:
-        ValueError: the actions are no Box, there is no ``dt``, or ``rest`` lies outside T.
+        ValueError: the actions are no Box, there is no ``dt``, ``rest`` lies outside T, the world's time limit is below
+            ``steps``, or only one of ``contexts`` and ``context`` is given.
     """
 
     def __init__(
@@ -56,6 +64,8 @@ class FromGymnasium:
         steps: int,
         outcome: Callable[[Sequence[Any]], ArrayLike],
         dt: float | None = None,
+        contexts: Box | None = None,
+        context: Callable[[Any], ArrayLike] | None = None,
     ) -> None:
         if not isinstance(world.action_space, gymnasium.spaces.Box) or len(world.action_space.shape) != 1:
             raise ValueError(f"needs continuous actions, a gymnasium Box of one axis, got {world.action_space}")
@@ -65,49 +75,91 @@ class FromGymnasium:
         self.world, self.controller, self._actions = world, controller, world.action_space
         self.primitive = controller if isinstance(controller, Primitive) else Primitive()
         self.policies, self.outcomes = controller.policies, outcomes
-        self.contexts = Box.cube(0.0, 1.0, 0)
+        if (contexts is None) != (context is None):
+            raise ValueError("contexts (C) and context, a function of the first observation, must be given together")
+        self.contexts = Box.cube(0.0, 1.0, 0) if contexts is None else contexts
         self.rest = check_point("rest", rest, outcomes.dim).copy()
         self.rest.flags.writeable = False
         self.outcome_noise, self.steps, self.dt = float(outcome_noise), check_count("steps", steps, 1), float(dt)
         check_robot(self)
         if hasattr(controller, "correspondence"):
             self.correspondence = controller.correspondence
-        self._outcome = outcome
+        name = "_max_episode_steps"  # of gymnasium's TimeLimit
+        limit = world.get_wrapper_attr(name) if world.has_wrapper_attr(name) else None
+        if limit is not None and limit < self.steps:
+            raise ValueError(
+                f"the world ends an episode after {limit} actions, but a movement has {self.steps}; make it with "
+                f"gymnasium.make(..., max_episode_steps={self.steps}), or choose fewer steps"
+            )
+        self._outcome, self._context = outcome, context
 
     def observe(self, rng: np.random.Generator) -> Array:
-        """``(0,)``, an empty context, because the random start of an episode counts as noise."""
-        return self.contexts.sample(rng)
+        """``(context_dim,)``, the context of a random start of an episode; it is empty if the start counts as noise.
+
+        Raises:
+            ValueError: the function ``context`` returns no context.
+        """
+        check_rng(rng)
+        if self._context is None:
+            return self.contexts.sample(rng)
+        return self._seen(int(rng.integers(STARTS)))
 
     def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
         """``(outcome_dim,)``, the outcome of one episode.
 
         Raises:
-            ValueError: ``theta`` is not one point of Pi, or the function ``outcome`` returns no outcome.
+            ValueError: ``theta`` is not one point of Pi, ``context`` is never observed, or the function ``outcome``
+                returns no outcome.
             TypeError: ``rng`` is not a Generator.
             SimulationError: MuJoCo gave a warning, or the outcome is not finite.
         """
-        _, theta = check_movement(self, context, theta)
+        context, theta = check_movement(self, context, theta)
+        check_rng(rng)
+        seed = _seed(rng) if self._context is None else self._seeds.get(context.tobytes())
+        if seed is None:
+            raise ValueError(
+                f"context {context.tolist()} is never observed: the start of an episode can be seen, not set; give a "
+                "context from observe()"
+            )
         actions = self.controller.at(theta, self.dt * np.arange(self.steps, dtype=np.float64))
-        return self._play(actions, rng, theta)
+        return self._play(actions, seed, theta, None if self._context is None else rng)
 
-    def replay(self, actions: ArrayLike) -> Array:
-        """``(outcome_dim,)``, the outcome of recorded ``actions`` ``(n, action_dim)``, always from the same start.
+    def replay(self, times: ArrayLike, trajectory: ArrayLike) -> Array:
+        """``(outcome_dim,)``, the outcome of recorded actions, always from the same start.
+
+        Args:
+            times: ``(n_times,)`` s, increasing from 0.
+            trajectory: ``(n_times, action_dim)``, actions at ``times``; between them they are interpolated.
 
         Raises:
-            ValueError: ``actions`` has another shape, or more rows than the ``steps`` of a movement.
+            ValueError: shapes do not fit, or the recording has more than the ``steps`` of a movement.
             SimulationError: see ``execute``.
         """
-        actions = check_vector("actions", actions, self._actions.shape[0])
-        if actions.ndim != 2 or not 0 < len(actions) <= self.steps:
-            raise ValueError(
-                f"needs 1 to {self.steps} actions in rows, got shape {actions.shape}; was the recording longer?"
-            )
-        return self._play(actions, stream(0, "replay"), actions[-1])
+        width, longest = self._actions.shape[0], self.dt * (self.steps - 1)
+        times, actions = check_recording(times, trajectory, width, longest=longest)
+        even = self.dt * np.arange(round((times[-1] - times[0]) / self.dt) + 1, dtype=np.float64)
+        played = np.stack([np.interp(even, times - times[0], column) for column in actions.T], axis=1)
+        return self._play(played, _seed(stream(0, "replay")), played[-1])
 
-    def _play(self, actions: Array, rng: np.random.Generator, theta: Array) -> Array:
-        """The outcome of an episode of these ``actions``; a `SimulationError` names ``theta``."""
-        check_rng(rng)
-        observation, _ = self.world.reset(seed=int(rng.integers(2**31)))
+    def _seen(self, seed: int) -> Array:
+        """The context of the start with this ``seed``."""
+        assert self._context is not None
+        first, _ = self.world.reset(seed=seed)
+        return check_point("context", np.array(self._context(first), dtype=np.float64), self.contexts.dim)
+
+    @cached_property
+    def _seeds(self) -> dict[bytes, int]:
+        """The first seed of each context, alike in all processes and after ``--resume``."""
+        return {self._seen(seed).tobytes(): seed for seed in reversed(range(STARTS))}
+
+    def _play(self, actions: Array, seed: int, theta: Array, rng: np.random.Generator | None = None) -> Array:
+        """The outcome of an episode of these ``actions``; a `SimulationError` names ``theta``.
+
+        The noise of the world after its reset comes from ``rng``; None: from ``seed``, as the start does.
+        """
+        observation, _ = self.world.reset(seed=seed)
+        if rng is not None:
+            self.world.unwrapped.np_random = rng
         observations = [deepcopy(observation)]
         for action in np.clip(actions, self._actions.low, self._actions.high):
             observation, _, terminated, truncated, _ = self.world.step(action.astype(self._actions.dtype))
@@ -121,6 +173,10 @@ class FromGymnasium:
         if not np.isfinite(outcome).all():
             raise SimulationError("the outcome is not finite", theta)
         return check_point("outcome", outcome, self.outcomes.dim)
+
+
+def _seed(rng: np.random.Generator) -> int:
+    return int(rng.integers(2**31))
 
 
 def measured_noise(environment: FromGymnasium, rng: np.random.Generator, *, movements: int = 20) -> float:

@@ -289,8 +289,8 @@ def check_recording(
     lasts = times[-1] - times[0]
     if lasts > longest * (1 + 1e-9):
         raise ValueError(
-            f"a movement lasts {longest:g} s at most, the recording {lasts:g} s; is it in milliseconds? To "
-            "play a slow recording faster, scale its times down"
+            f"a movement lasts {longest:g} s at most, the recording {lasts:g} s; is it in milliseconds? --speed of "
+            "sgimd demonstrations plays a slow recording faster"
         )
     return times, trajectory
 

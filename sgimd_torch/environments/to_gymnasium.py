@@ -24,10 +24,10 @@ Observation = dict[str, Array]
 class ToGymnasium(gymnasium.Env[Any, Any]):
     """A goal environment of one step.
 
-    ``observation`` is the context, ``achieved_goal`` the outcome (``rest`` before the movement), ``desired_goal`` the
-    goal. Goal and context are drawn, or given as ``reset(options={"goal": ..., "context": ...})``. The reward is minus
-    the distance of the outcome from the goal. ``info["is_success"]`` is true if this distance is at most .02, or at
-    most the outcome noise.
+    ``observation`` is the context, or a constant 0 without contexts; ``achieved_goal`` is the outcome (``rest`` before
+    the movement), ``desired_goal`` the goal. Goal and context are drawn, or given as ``reset(options={"goal": ...,
+    "context": ...})``. The reward is minus the distance of the outcome from the goal. ``info["is_success"]`` is true if
+    this distance is at most .02, or at most the outcome noise.
     """
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - as gymnasium declares it
@@ -39,7 +39,8 @@ class ToGymnasium(gymnasium.Env[Any, Any]):
         )  # outcomes may lie outside T
         self.observation_space: gymnasium.spaces.Dict[Any] = gymnasium.spaces.Dict(
             {
-                "observation": _box(environment.contexts),
+                # Learners such as those of stable-baselines3 need an observation of at least one number.
+                "observation": _box(environment.contexts if environment.contexts.dim else Box.cube(0.0, 1.0, 1)),
                 "achieved_goal": anywhere,
                 "desired_goal": _box(environment.outcomes),
             }
@@ -86,7 +87,7 @@ class ToGymnasium(gymnasium.Env[Any, Any]):
     def _observation(self, outcome: Array) -> Observation:
         assert self._goal is not None
         return {
-            "observation": self._context.copy(),
+            "observation": self._context.copy() if self._context.size else np.zeros(1),
             "achieved_goal": np.array(outcome, dtype=np.float64),
             "desired_goal": self._goal.copy(),
         }

@@ -23,8 +23,6 @@ from sgimd_torch.teach.led import HandLed, hand_led_of
 
 RATE: Final = 50.0  # Hz, sampling rate of the shipped demonstrations and of motor primitives
 FASTER: Final = 1.02  # multiple of the robot's largest speed; a joint that was led faster gets a remark
-MOVES: Final = 0.02  # rad/s; an arm whose joints were never faster counts as unmoved
-STILL: Final = 0.05  # share of the recording's largest speed; while all joints are slower, the arm counts as pausing
 AWAY: Final = 0.05  # rad; a recording that starts farther from the start of movements gets a remark
 
 
@@ -69,20 +67,6 @@ def lesson_by_hand(times: Array, joints: Array, task: Task, rng: np.random.Gener
     shown = Demonstration(context, even, trajectory, robot.execute(context, theta_d.copy(), rng))
     remarks = (*_unlike_led(times, played, joints, led), *beyond_limits(robot, shown))
     return HandLesson(shown, read_only(theta_d), misfit_of(robot, theta_d, shown), remarks)
-
-
-def moving(times: Array, joints: Array) -> tuple[Array, Array]:
-    """The recording without the pauses before and after the movement; its times start at 0.
-
-    Raises:
-        ValueError: the arm never moved.
-    """
-    speeds = np.abs(np.diff(joints, axis=0)).max(axis=1) / np.diff(times)
-    if not speeds.max() > MOVES:
-        raise ValueError("you did not move the arm")
-    moved = np.flatnonzero(speeds > STILL * speeds.max())
-    kept = slice(moved[0], moved[-1] + 2)
-    return times[kept] - times[moved[0]], joints[kept]
 
 
 def resampled(times: Array, joints: Array) -> tuple[Array, Array]:

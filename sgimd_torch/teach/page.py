@@ -17,10 +17,11 @@ from typing import Any, Final
 import numpy as np
 import viser
 
+from sgimd_torch.demonstrations.units import moving
 from sgimd_torch.spaces import Array
 from sgimd_torch.teach.leading import Leading
 from sgimd_torch.teach.led import hand_led_of
-from sgimd_torch.teach.lessons import HandLesson, moving
+from sgimd_torch.teach.lessons import HandLesson
 from sgimd_torch.teach.panel import Panel
 from sgimd_torch.teach.scene import Scene
 from sgimd_torch.teach.taught import Status, TaughtRun

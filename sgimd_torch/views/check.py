@@ -7,8 +7,10 @@ corners of Pi:
   contexts, policies, outcomes    are Boxes, and rest lies in outcomes
   observe, execute                return float64 arrays of the right shape, draw from their rng alone, and change
                                   neither arguments nor earlier results
-  no state carries over           a movement repeated with an equal stream has the same outcome
-  outcome_noise                   is 0 if repeated outcomes are equal, else right within a factor of ten
+  no state carries over           a movement repeated with an equal stream has the same outcome; a difference by
+                                  rounding is a remark
+  outcome_noise                   is 0 if repeated outcomes are equal, else right for the median movement within a
+                                  factor of ten; a movement that scatters far more is a remark
   execute_many (optional)         each row equals execute to the last bit
   invalid movements               are refused with a ValueError
   trace (optional)                has the same outcome as execute with an equal stream
@@ -68,9 +70,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         raise ValueError(f"environment {options.environment} cannot be made: {why}") from error
     name = type(task.environment).__name__
     try:
-        check_environment(task.environment, movements=options.movements)
+        remarks = check_environment(task.environment, movements=options.movements)
         _check_picture(task)
-        found = [f"{name} keeps every promise", *_goals(task), *_lessons(task)]
+        found = [f"{name} keeps every promise", *(f"  {each}" for each in remarks), *_goals(task), *_lessons(task)]
     except SystemExit as end:  # exit(0) in the user's code would look like success
         raise ValueError(f"{name} calls exit({end}); raise an exception where a movement fails") from end
     print("\n".join(found))

@@ -1,20 +1,23 @@
-"""Check demonstrations on a robot, or import them from other formats.
+"""Check recordings on a robot, or import them from other formats.
 
   check    prints a line for each recording: the recorded outcome (says), the outcome on the simulated robot (lands),
            the distance between these outcomes (apart), the distance from the recording to the movement that the robot
            plays (misfit), and the limits of the robot that the recording exceeds (remarks)
-  import   converts recordings in CSV or in a LeRobot dataset (v3) to a file for sgimd run --demonstrations
+  import   converts recordings to a file for sgimd run --demonstrations; with --environment it checks them first
 
-SOURCE is an .npz file of save_demonstrations, a CSV file, a folder with a CSV file for each recording, or the folder of
-a LeRobot dataset. For CSV and LeRobot, options name the columns. A column may be a vector, as in LeRobot:
-observation.state is the whole vector, and observation.state[0:6] is its first six entries. The outcome is read in the
-last row of a recording, and the context in its first row.
+SOURCE is an .npz file of save_demonstrations, a text file with columns, a folder with a text file for each recording,
+or the folder of a LeRobot dataset (v2.1 or v3). Columns of a text are divided by commas, semicolons, tabs or spaces.
+Options name the columns. A column may be a vector, as in LeRobot: observation.state is the whole vector,
+observation.state[0:6] is its first six entries, and gripper.pos is the entry of this name.
+
+The outcome is read in the last row of a recording, and the context in its first row. Without --outcome, the robot
+replays the recording, or executes its translation if it cannot replay, and this outcome counts.
 
 Examples:
-  sgimd demonstrations check shown.npz --task fishing-rod
-  sgimd demonstrations check recordings --task mypackage.toss:make --joints shoulder,elbow --outcome x,y
-  sgimd demonstrations import datasets/my_arm --joints observation.state[0:6] --outcome observation.place[0:2]
-      --time timestamp --recording episode_index --degrees --out shown.npz
+  sgimd demonstrations check shown.npz --environment fishing-rod
+  sgimd demonstrations check logs --environment mypackage.toss:make --columns time,a,b,x,y --joints a,b --outcome x,y
+  sgimd demonstrations import datasets/my_arm --joints observation.state --environment mypackage.arm:make
+      --unit deg,gripper=0:100 --trim --out shown.npz
 
 Exit code: 0 all recordings can be used, 2 some cannot be used, or the request is wrong.
 """
@@ -23,22 +26,24 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
-from sgimd_torch.demonstrations.columns import Columns, read_csv
+from sgimd_torch.demonstrations.columns import Columns, Recording
 from sgimd_torch.demonstrations.fit import beyond_limits, misfit_of
-from sgimd_torch.environments.protocol import SimulationError, execute_many
+from sgimd_torch.demonstrations.text import read_text
+from sgimd_torch.demonstrations.units import in_units, paced
+from sgimd_torch.environments.protocol import SimulationError, execute_many, primitive_of
 from sgimd_torch.runs.build import task_of
-from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.process import parser_of
+from sgimd_torch.runs.command_line import parse
+from sgimd_torch.runs.process import parser_of, say
 from sgimd_torch.runs.tasks import Task
-from sgimd_torch.runs.tasks.taught import correspondence_of
-from sgimd_torch.spaces import Array, Demonstration, stream
+from sgimd_torch.runs.tasks.taught import Replaying, theta_of
+from sgimd_torch.spaces import Array, Box, Demonstration, stream
 from sgimd_torch.views.text_table import print_table
 
 HEADS: Final = ("recording", "lasts (s)", "samples", "says", "lands", "apart", "misfit", "remarks")
@@ -72,31 +77,48 @@ def parser() -> argparse.ArgumentParser:
     """The options of ``sgimd demonstrations``."""
     source = argparse.ArgumentParser(add_help=False)
     source.add_argument("source", type=Path, metavar="SOURCE")
-    for option, about in (("joints", "joint angles or commands"), ("outcome", "outcome"), ("context", "context")):
-        source.add_argument(
-            f"--{option}", type=_names, default=(), metavar="COLUMN,COLUMN", help=f"columns of the {about}"
-        )
-    source.add_argument("--time", metavar="COLUMN", help="column of times in s (default: time; in LeRobot timestamp)")
+    columns = {
+        "joints": "columns of joint angles or commands, in the robot's order (default: names of the robot's joints)",
+        "outcome": "columns of the outcome (default: outcome on the robot of --environment)",
+        "context": "columns of the context",
+        "columns": "names of all columns of a text whose first row has no names",
+    }
+    for option, about in columns.items():
+        source.add_argument(f"--{option}", type=_names, default=(), metavar="COLUMN,COLUMN", help=about)
+    timed = source.add_mutually_exclusive_group()
+    timed.add_argument("--time", metavar="COLUMN", help="column of times in s (default: time; in LeRobot timestamp)")
+    timed.add_argument("--rate", type=_above_zero, metavar="HZ", help="samples per second, if there are no times")
     source.add_argument(
         "--recording",
         metavar="COLUMN",
         help="column that divides a table into recordings (default: none; in LeRobot episode_index)",
     )
-    source.add_argument("--degrees", action="store_true", help="convert joints from degrees to radians")
+    source.add_argument(
+        "--unit",
+        type=_units,
+        default={},
+        metavar="UNIT,JOINT=UNIT",
+        help="unit of all or of single joints: rad, deg, or a range such as 0:100, which maps onto the joint's range; "
+        "rad leaves commands alone (default: rad, unless a joint reads more than a turn)",
+    )
+    source.add_argument("--speed", type=_above_zero, default=1.0, help="factor on the speed (default: %(default)s)")
+    source.add_argument("--trim", action="store_true", help="cut off stillness before and after the movement")
     shown: dict[str, Any] = {"description": __doc__, "formatter_class": argparse.RawDescriptionHelpFormatter}
     parser = parser_of("demonstrations", __doc__)
     commands = parser.add_subparsers(dest="command", required=True, metavar="check|import")
     checked = commands.add_parser("check", help="execute recordings on a robot", parents=[source], **shown)
-    checked.add_argument(
-        "--task",
-        required=True,
-        metavar="ENVIRONMENT",
-        help="robot: a name or module:attribute, as for --environment of sgimd run",
-    )
     imported = commands.add_parser(
         "import", help="convert recordings to a file for --demonstrations", parents=[source], **shown
     )
+    for command in (checked, imported):
+        command.add_argument(
+            "--environment",
+            required=command is checked,
+            metavar="ENVIRONMENT",
+            help="robot that executes the recordings, and its options, as for sgimd run: a name or module:attribute",
+        )
     imported.add_argument("--out", type=Path, required=True, metavar="FILE.npz", help="file to write")
+    imported.add_argument("--skip-unusable", action="store_true", help="leave out recordings that cannot be used")
     return parser
 
 
@@ -104,90 +126,134 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Check or import demonstrations, and return the exit code 0.
 
     Raises:
-        ValueError: the source cannot be read, or the robot cannot use some recordings.
+        ValueError: the source cannot be read, or some recordings cannot be used.
         OSError: a file cannot be read or written.
     """
-    options = parser().parse_args(argv)
-    if options.command == "import" and options.out.suffix != ".npz":
+    options, of_robot = parser().parse_known_args(argv)
+    importing = options.command == "import"
+    if importing and options.out.suffix != ".npz":
         raise ValueError(f"--out must end in .npz, got {options.out}")
-    shown = read(options)
-    if options.command == "import":
+    if not options.source.is_file() and not options.source.is_dir():
+        raise FileNotFoundError(f"there is no {options.source}")
+    task = None
+    if options.environment:
+        task = task_of(parse([f"--environment={options.environment}", *of_robot])[0])
+    elif of_robot:
+        raise ValueError(f"{of_robot[0]} is no option of sgimd demonstrations import, or needs --environment")
+    found = read(options, primitive_of(task.environment).ranges if task else None)
+    if task is not None:
+        found = _on_robot(task, found, options.source)
+    unusable, usable = ([each for each in found if bool(each.refused) is wrong] for wrong in (True, False))
+    if unusable:
+        first = f"{unusable[0].name}: {unusable[0].refused}"
+        told = f"{len(unusable)} of {len(found)} recordings of {options.source} cannot be used; the first is {first}"
+        if len(found) == 1:
+            told = f"{options.source} cannot be used: {unusable[0].refused}"
+        if not usable or not importing or not options.skip_unusable:
+            raise ValueError(told + "; --skip-unusable leaves such out" * bool(importing and usable))
+        say(*(f"left out {each.name}: {each.refused}" for each in unusable))
+    if importing:
+        shown = [each.shown for each in usable if each.shown is not None]
         save_demonstrations(options.out, shown)
         print(f"{options.out}: {len(shown)} recordings, {shown[0].trajectory.shape[1]} joints")
-        return 0
-    task = task_of(Config(parts={"environment": options.task}))
-    contexts = task.environment.contexts
-    if contexts.dim and not shown[0].context.size:
-        what = ", ".join(contexts.axis(k, "context") for k in range(contexts.dim))
-        raise ValueError(f"{options.source} has no context ({what}); name its columns with --context")
-    found = [check(task, each, row) for row, each in enumerate(shown)]
-    print_table([HEADS, *(_cells(row, each) for row, each in enumerate(found))])
-    apart = [each.apart for each in found if each.lands is not None]
-    if apart:
-        remarked = sum(bool(each.remarks) for each in found)
-        print(
-            f"{len(apart)} of {len(found)} can be used; they land {np.median(apart):.3f} (median), "
-            f"{max(apart):.3f} (most) from where they say; {remarked} have remarks"
-        )
-    refused = [row for row, each in enumerate(found) if each.refused]
-    if refused:
-        first = f"the first is recording {refused[0]}: {found[refused[0]].refused}"
-        raise ValueError(f"{len(refused)} of {len(found)} recordings of {options.source} cannot be used; {first}")
     return 0
 
 
-def read(options: argparse.Namespace) -> list[Demonstration]:
-    """Read the recordings of a source of any format.
+def read(options: argparse.Namespace, ranges: Box | None) -> list[Recording]:
+    """Read the recordings of a source of any format; ``ranges`` are those of the robot's joints, if they are known.
 
     Raises:
-        ValueError: the source is damaged, or the names of its columns are missing.
-        OSError: there is no such source.
+        ValueError: the source is damaged, or names or units of its columns are missing.
+        OSError: the source cannot be read.
     """
-    source: Path = options.source
-    if not source.exists():
-        raise FileNotFoundError(f"there is no {source}")
+    source, units, doubt = options.source, options.unit, ""
+    is_dataset = any((source / folder).is_dir() for folder in ("meta", "meta_data")) or source.suffix == ".parquet"
     if source.suffix == ".npz":
-        return load_demonstrations(source)
-    if not options.joints or not options.outcome:
-        raise ValueError(f"{source} is no .npz file, so name its columns: --joints COLUMN,... --outcome COLUMN,...")
-    is_dataset = (source / "meta").is_dir()
-    columns = Columns(
-        options.joints,
-        options.outcome,
-        options.context,
-        options.time or ("timestamp" if is_dataset else "time"),
-        options.recording or ("episode_index" if is_dataset else None),
-        options.degrees,
-    )
-    if not is_dataset:
-        return read_csv(source, columns)
-    from sgimd_torch.demonstrations.lerobot import read_lerobot  # loads pyarrow, an optional dependency
+        shown = load_demonstrations(source)
+        names = tuple(f"joint {k}" for k in range(shown[0].trajectory.shape[1]))
+        found = [Recording(str(row), each, names) for row, each in enumerate(shown)]
+        units = {"": "rad", **units}
+    elif is_dataset:
+        from sgimd_torch.demonstrations.lerobot import read_lerobot  # loads pyarrow, an optional dependency
 
-    return read_lerobot(source, columns)
+        found, doubt = read_lerobot(source, _columns(options, ranges, "timestamp", "episode_index"))
+    else:
+        found = read_text(source, _columns(options, ranges, "time", None))
+    found = in_units(found, units, ranges, doubt=doubt)
+    return [paced(each, options.speed, trim=options.trim) for each in found]
+
+
+def _columns(options: argparse.Namespace, ranges: Box | None, time: str, recording: str | None) -> Columns:
+    """The columns that the options name; ``time`` and ``recording`` are defaults."""
+    joints = options.joints or (ranges.names if ranges is not None else ())
+    if not joints:
+        raise ValueError(f"{options.source} is no .npz file, so name its columns of joints: --joints COLUMN,COLUMN")
+    if not options.outcome and not options.environment:
+        raise ValueError(
+            f"{options.source} needs outcomes: name their columns with --outcome COLUMN,COLUMN, or name a robot with "
+            "--environment, which then executes the recordings"
+        )
+    times, divided = options.time or time, options.recording or recording
+    return Columns(joints, options.outcome, options.context, times, divided, options.rate, options.columns)
 
 
 def check(task: Task, shown: Demonstration, row: int) -> Checked:
-    """Translate a recording and execute it on the robot of a task, with motor noise from the stream number ``row``."""
+    """Translate a recording and execute it on the robot of a task, with motor noise from the stream number ``row``.
+
+    A recording without an outcome gets the outcome of its replay, or of its translation if the robot has no replay.
+    """
     robot = task.environment
     remarks = beyond_limits(robot, shown)
     try:
-        if shown.outcome.shape != (robot.outcomes.dim,):
+        if shown.outcome.size and shown.outcome.shape != (robot.outcomes.dim,):
             raise ValueError(f"its outcome has {shown.outcome.size} numbers, an outcome in T has {robot.outcomes.dim}")
         context = robot.contexts.check("its context", shown.context)
-        theta = correspondence_of(task)(shown.times, shown.trajectory)
-        theta = robot.policies.check("theta_d of the correspondence", theta)
+        theta = theta_of(task, shown)
         lands = execute_many(robot, context[None], theta[None], [stream(row, "demonstrations check")])[0]
+        if not shown.outcome.size:
+            outcome = lands
+            if isinstance(robot, Replaying) and not context.size:  # a replay has no context
+                outcome = robot.replay(shown.times, shown.trajectory)
+            shown = replace(shown, outcome=outcome)
+            remarks = beyond_limits(robot, shown)
     except (ValueError, SimulationError) as error:
         return Checked(shown, None, float("nan"), remarks, str(error))
     return Checked(shown, lands, misfit_of(robot, theta, shown), remarks)
 
 
-def _cells(row: int, found: Checked) -> tuple[str, ...]:
+def _on_robot(task: Task, found: Sequence[Recording], source: Path) -> list[Recording]:
+    """The recordings after a check on the robot of the task; prints a line for each of them."""
+    contexts = task.environment.contexts
+    if contexts.dim and any(each.shown is not None and not each.shown.context.size for each in found):
+        what = ", ".join(contexts.axis(k, "context") for k in range(contexts.dim))
+        raise ValueError(f"{source} has no context ({what}); name its columns with --context")
+    table: list[Sequence[str]] = [HEADS]
+    after, apart, remarked = list[Recording](), list[float](), 0
+    for row, each in enumerate(found):
+        if each.shown is None:
+            table.append((each.name, *"------", f"cannot be used: {each.refused}"))
+            after.append(each)
+            continue
+        checked = check(task, each.shown, row)
+        table.append(_cells(each.name, checked))
+        after.append(each._replace(shown=checked.shown, refused=checked.refused))
+        remarked += bool(checked.remarks)
+        apart += [] if checked.lands is None else [checked.apart]
+    print_table(table)
+    if apart:
+        print(
+            f"{len(apart)} of {len(found)} can be used; they land {np.median(apart):.3f} (median), "
+            f"{max(apart):.3f} (most) from where they say; {remarked} have remarks"
+        )
+    return after
+
+
+def _cells(name: str, found: Checked) -> tuple[str, ...]:
     """Cells of a recording in the table, one below each of ``HEADS``."""
     times = found.shown.times
     refused = [f"cannot be used: {found.refused}"] if found.refused else []
     return (
-        str(row),
+        name,
         f"{times[-1] - times[0]:.3g}",
         str(len(times)),
         _point(found.shown.outcome),
@@ -203,3 +269,16 @@ def _point(point: Array) -> str:
 
 def _names(text: str) -> tuple[str, ...]:
     return tuple(name.strip() for name in text.split(",") if name.strip())
+
+
+def _units(text: str) -> dict[str, str]:
+    """Units by name of the joint; the name of a unit alone is ""."""
+    parts = [each.rpartition("=") for each in _names(text)]
+    return {joint.strip(): unit.strip() for joint, _, unit in parts}
+
+
+def _above_zero(text: str) -> float:
+    value = float(text)
+    if not 0 < value < np.inf:
+        raise argparse.ArgumentTypeError(f"must be above 0, got {text}")
+    return value

@@ -184,6 +184,38 @@ def test_one_that_keeps_every_promise_passes_and_so_does_its_batch():
     sgimd_torch.check_environment(Cannon(), movements=10)
 
 
+class Warm(Cannon):
+    """Ends in another place each time, by rounding."""
+
+    outcome_noise, calls, execute_many = 0.0, 0, None
+
+    def execute(self, context, theta, rng):
+        self.calls += 1
+        context, theta = check_movement(self, context, theta)
+        return context + theta[:1] + 1e-5 * (self.calls % 3)
+
+
+class Wild(Cannon):
+    """One corner of Pi scatters a thousand times as much."""
+
+    execute_many = None
+
+    def execute(self, context, theta, rng):
+        context, theta = check_movement(self, context, theta)
+        return context + theta[:1] + rng.normal(0, 100 if (theta == 1).all() else 0.1, 1)
+
+
+def test_a_repeat_that_differs_by_rounding_is_a_remark_with_the_difference():
+    (remark,) = check_environment(Warm())
+    assert re.match(r"a repeated movement .* ends [12]e-05 away, as by rounding", remark)
+
+
+def test_scatter_is_that_of_the_median_movement_and_one_that_scatters_far_more_is_remarked():
+    (remark,) = check_environment(Wild())
+    assert re.match(r"theta \[1.0, 1.0\] scatters by 1.3e\+02, a typical movement by 0.19:", remark)
+    assert check_environment(Cannon()) == []
+
+
 def test_all_slips_of_the_spaces_are_told_at_once():
     class Bare:
         """As a user begins: nothing is there yet."""

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
+from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.demonstrations.fit import misfit_of
 from sgimd_torch.environments.check import check_environment
 from sgimd_torch.environments.controllers import Sinusoids
@@ -18,6 +19,7 @@ from sgimd_torch.runs.build import task_of
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.tasks import benchmark_of
 from sgimd_torch.runs.tasks.taught import demonstrations_of
+from sgimd_torch.session import run
 from sgimd_torch.spaces import Box, stream
 
 PUSHES = Box.cube(-1, 1, 2)
@@ -52,6 +54,22 @@ class Sled(gymnasium.Env):
 
     def seen(self):
         return {"observation": self.speed, "achieved_goal": self.place, "desired_goal": np.zeros(2)}  # its own buffers
+
+
+class Endless(Sled):
+    """Its second action has no upper bound."""
+
+    def __init__(self):
+        super().__init__()
+        self.action_space = gymnasium.spaces.Box(np.float32([-1, -1]), np.float32([1, np.inf]))
+
+
+class Windy(Sled):
+    """Each step draws noise."""
+
+    def step(self, action):
+        self.place += self.np_random.normal(0, 0.01, 2)
+        return super().step(action)
 
 
 def achieved(observations):
@@ -94,6 +112,15 @@ def test_a_movement_is_an_episode_of_the_controllers_commands():
         ),
         (lambda: sled(world=gymnasium.make("MountainCarContinuous-v0")), "needs dt > 0, .* has the world no dt"),
         (lambda: sled(steps=0), "steps must be a whole number >= 1"),
+        (
+            lambda: sled(world=gymnasium.wrappers.TimeLimit(Sled(), 12)),
+            r"ends an episode after 12 actions, but a movement has 20; .* max_episode_steps=20",
+        ),
+        (lambda: sled(contexts=Box.cube(-1, 1, 2)), "contexts .* and context, .* must be given together"),
+        (
+            lambda: Box(Endless().action_space.low, Endless().action_space.high),
+            r"dimension 1 is \[-1.0, inf\]; is it a space without bounds",
+        ),
     ],
 )
 def test_what_cannot_be_a_task_is_refused(make, message):
@@ -111,6 +138,44 @@ def test_a_world_that_diverges_names_the_theta():
         sled(world=Breaking()).execute(NO_CONTEXT, np.full(9, 0.5), stream(0, "any"))
 
 
+def seen(first):
+    return first["achieved_goal"]
+
+
+@pytest.mark.parametrize(("world", "noise"), [(Sled(), 0.0), (Windy(), 0.045)])
+def test_a_start_that_is_seen_and_not_set_is_a_context(world, noise):
+    robot = sled(world=world, contexts=Box.cube(-0.1, 0.1, 2), context=seen, outcome_noise=noise)
+    check_environment(robot)
+    assert measured_noise(robot, stream(0, "any")) == pytest.approx(noise, rel=0.2)
+    starts = [robot.observe(stream(k, "any")) for k in range(2)]
+    still = np.full(9, 0.5)
+    ends = [robot.execute(start, still, stream(0, "any")) for start in starts]
+    np.testing.assert_allclose(ends[0] - ends[1], starts[0] - starts[1], atol=1e-12)  # it does not move but by the wind
+    elsewhere = sled(world=type(world)(), contexts=Box.cube(-0.1, 0.1, 2), context=seen, outcome_noise=noise)
+    assert elsewhere.execute(starts[0], still, stream(0, "any")).tolist() == ends[0].tolist()  # as after --resume
+    with pytest.raises(ValueError, match=r"context \[0.0, 0.0\] is never observed: .* can be seen, not set"):
+        robot.execute(np.zeros(2), still, stream(0, "any"))
+
+
+def test_the_pendulum_learns_from_starts_that_it_sees():
+    world = gymnasium.make("Pendulum-v1")
+    robot = FromGymnasium(
+        world,
+        GaussianPrimitive(Box(world.action_space.low, world.action_space.high), (1.0, 5.0)),
+        steps=100,
+        outcome=lambda observations: [np.arctan2(*observations[-1][1::-1])],
+        outcomes=Box.cube(-np.pi, np.pi, 1, names=("angle",), unit="rad"),
+        rest=[0.0],
+        outcome_noise=0.0,
+        contexts=Box.cube(-1.01, 1.01, 3),
+        context=lambda first: first / [1, 1, 8],
+    )
+    check_environment(robot)
+    learner = practice(robot, 0)
+    outcomes = [episode.outcome for episode in run(learner, robot, 0, movements=20)]
+    assert np.ptp(outcomes) > 1
+
+
 def test_the_noise_of_resets_is_measured():
     found = measured_noise(sled(), stream(0, "any"), movements=200)
     assert found == pytest.approx(0.1 / np.sqrt(3), rel=0.1)  # the uniform start is the only noise
@@ -122,6 +187,28 @@ def test_the_noise_of_resets_is_measured():
 )
 def test_our_environments_pass_gymnasiums_own_check(arm):
     check_env(ToGymnasium(arm))
+
+
+def test_an_observation_has_a_number_even_without_contexts():
+    world = ToGymnasium(PlanarArm(3))
+    first, _ = world.reset(seed=0)
+    last, *_ = world.step(np.full(3, 0.5))
+    assert first["observation"].tolist() == last["observation"].tolist() == [0.0]
+    assert world.observation_space.contains(first)
+
+
+@pytest.mark.slow
+def test_hindsight_learns_on_a_robot_of_ours():
+    sb3 = pytest.importorskip("stable_baselines3")
+    world = ToGymnasium(PlanarArm(3))
+    settings = {"learning_rate": 1e-3, "ent_coef": 0.01, "seed": 0}
+    learner = sb3.SAC("MultiInputPolicy", world, replay_buffer_class=sb3.HerReplayBuffer, **settings)
+    learner.learn(600)
+    rewards = []
+    for seed in range(40):
+        observation, _ = world.reset(seed=seed)
+        rewards.append(world.step(learner.predict(observation, deterministic=True)[0])[1])
+    assert np.mean(rewards) > -0.4  # it was -.17; random movements have -.93
 
 
 def test_an_episode_of_ours_is_one_movement_whose_reward_is_the_distance_to_the_goal():
@@ -205,9 +292,9 @@ def test_the_swimmer_is_a_task_with_goals_and_demonstrations():
     assert np.median(misfits) == pytest.approx(0.0347, abs=5e-5)  # the hand shook
     still = Swimmer(start=0.0)
     for each in shown[:3]:
-        np.testing.assert_allclose(still.replay(each.trajectory), each.outcome, atol=1e-9)
+        np.testing.assert_allclose(still.replay(each.times, each.trajectory), each.outcome, atol=1e-9)
         theta = still.correspondence(each.times, each.trajectory)
         landed = still.execute(NO_CONTEXT, theta, stream(0, "any"))
         assert np.linalg.norm(landed - each.outcome) < 0.3
-    with pytest.raises(ValueError, match="needs 1 to 150 actions in rows"):
-        still.replay(np.zeros((151, 2)))
+    with pytest.raises(ValueError, match=r"a movement lasts 5.96 s at most, the recording 6 s"):
+        still.replay(0.04 * np.arange(151), np.zeros((151, 2)))

@@ -84,7 +84,7 @@ def test_the_first_minute(open_tab, rod):
     tab.tab.get_by_role("button", name="Record").click()
     rod.until(lambda: rod.leading.recording)
     tab.tab.get_by_role("button", name="Stop").click()
-    tab.tab.get_by_text("you did not move the arm").wait_for()
+    tab.tab.get_by_text("no joint moved").wait_for()
     assert show.is_disabled()
     tab.tab.get_by_role("button", name="Record").click()
     rod.until(lambda: rod.leading.recording)

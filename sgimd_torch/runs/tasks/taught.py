@@ -30,6 +30,15 @@ class Translating(Protocol):
         ...
 
 
+@runtime_checkable
+class Replaying(Protocol):
+    """An environment that can follow a recording sample by sample (optional)."""
+
+    def replay(self, times: Array, trajectory: Array) -> Array:
+        """``(outcome_dim,)``; ``times`` ``(n_times,)`` s from 0, ``trajectory`` ``(n_times, n_joints)``."""
+        ...
+
+
 def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstration], list[str], str | None]:
     """Demonstrations of a teacher, messages about them, and the checksum of their file (None: no file).
 
@@ -52,18 +61,9 @@ def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstra
     if isinstance(source, Path):
         crc32 = checksum(source)
         shown = load_demonstrations(source, outcome_dim=robot.outcomes.dim, context_dim=robot.contexts.dim)
-        translate, primitive = correspondence_of(task), primitive_of(robot)
-        shortest, ranges = primitive.durations[0], primitive.ranges
         for row, each in enumerate(shown):
             try:
-                if (lasts := each.times[-1] - each.times[0]) < shortest / FASTER:
-                    raise ValueError(f"it lasts {lasts:g} s, movements at least {shortest:g} s; is it in milliseconds?")
-                misfit = misfit_of(robot, translate(each.times, each.trajectory), each)
-                if ranges is not None and misfit > TOO_FAR * ranges.sides.mean():
-                    raise ValueError(
-                        f"the nearest movement of the robot misses it by {misfit:.2f} (root mean square); is it in "
-                        "degrees, or with the joints in another order?"
-                    )
+                theta_of(task, each)
             except ValueError as error:
                 raise ValueError(f"{source}: recording {row} cannot be translated: {error}") from error
     else:
@@ -91,3 +91,27 @@ def correspondence_of(task: Task) -> Correspondence:
         f"{type(task.environment).__name__} has no correspondence, so demonstrations cannot be translated; give it "
         "a method correspondence(times, trajectory) -> theta, or return Task(environment, correspondence=...)"
     )
+
+
+def theta_of(task: Task, shown: Demonstration) -> Array:
+    """theta_d ``(theta_dim,)`` of a demonstration, eq. (6).
+
+    Raises:
+        ValueError: the task has no correspondence, the correspondence refuses the recording, or no movement of the
+            robot comes near it.
+    """
+    robot, primitive = task.environment, primitive_of(task.environment)
+    shortest, ranges = primitive.durations[0], primitive.ranges
+    if (lasts := shown.times[-1] - shown.times[0]) < shortest / FASTER:
+        raise ValueError(
+            f"it lasts {lasts:g} s, movements at least {shortest:g} s; is it in milliseconds, or played too fast?"
+        )
+    theta = correspondence_of(task)(shown.times, shown.trajectory)
+    theta = robot.policies.check("theta_d of the correspondence", theta)
+    misfit = misfit_of(robot, theta, shown)
+    if ranges is not None and misfit > TOO_FAR * ranges.sides.mean():
+        raise ValueError(
+            f"the nearest movement of the robot misses it by {misfit:.2f} (root mean square); is it in degrees, with "
+            "the joints in another order, or with a jerk?"
+        )
+    return theta
