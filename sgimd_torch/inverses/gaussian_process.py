@@ -14,8 +14,7 @@ from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple, ParamSpec, TypeVar
 
 import numpy as np
-from scipy.linalg import cho_solve, cholesky
-from scipy.linalg.lapack import dpotri
+from scipy.linalg.lapack import dpotrf, dpotri, dpotrs
 from scipy.optimize import minimize
 from threadpoolctl import ThreadpoolController
 
@@ -72,28 +71,24 @@ def fit_lengths(inputs: Array, outcomes: Array) -> Array:
     deviations = outcomes - outcomes.mean(axis=0)
     deviations = deviations / deviations.std()
     guess = np.log(1.5 * np.sqrt(dim))
-    squares = inputs * inputs
+    columns, kernels = np.ascontiguousarray(inputs.T), compiled("sgimd_torch.inverses.kernels")
 
     def loss(parameters: Array) -> tuple[float, Array]:
-        shrunk, noise = np.exp(-parameters[:dim]), float(np.exp(parameters[dim]))
-        scaled = inputs * shrunk
-        distances = _ROOT5 * np.sqrt(squared_distances(scaled, scaled))
-        decay = np.exp(-distances)
-        covariance = (1 + distances * (1 + distances / 3)) * decay  # Matern 5/2
-        covariance.flat[:: n + 1] += noise
-        factor = cholesky(covariance, lower=True, overwrite_a=True, check_finite=False)
+        scaled, noise = columns * np.exp(-parameters[:dim, None]), float(np.exp(parameters[dim]))
+        covariance, slopes = kernels.smooth(scaled, noise)
+        # The lower half of an array of C is the upper half of an array of Fortran.
+        factor, failed = dpotrf(covariance.T, lower=False, overwrite_a=True)
+        if failed:
+            raise np.linalg.LinAlgError("the covariance is not positive definite")
         logs = np.log(np.diag(factor)).sum()
-        weights = cho_solve((factor, True), deviations, check_finite=False)
-        inverse, _ = dpotri(factor, lower=True, overwrite_c=True)  # its lower half
-        inverse = np.tril(inverse) + np.tril(inverse, -1).T
+        weights, _ = dpotrs(factor, deviations, lower=False)
+        inverse, _ = dpotri(factor, lower=False, overwrite_c=True)
         variance = (deviations * weights).mean()
-        by_covariance = 0.5 * (deviations.shape[1] * inverse - weights @ weights.T / variance)
-        by_square = by_covariance * (5 / 3 * (1 + distances) * decay)
+        by_lengths, by_noise = kernels.gradient(scaled, inverse.T, np.ascontiguousarray(weights.T), slopes, variance)
         off = (parameters[:dim] - guess) / 1.5
-        gradient = 2 * (by_square.sum(axis=1) @ squares - (inputs * (by_square @ inputs)).sum(axis=0)) * shrunk**2
         likelihood = 0.5 * deviations.size * np.log(variance) + deviations.shape[1] * logs
         value = float(likelihood + 0.5 * (off * off).sum())
-        return value, np.append(gradient + off / 1.5, noise * np.trace(by_covariance))
+        return value, np.append(by_lengths + off / 1.5, noise * by_noise)
 
     bounds = [(guess - 5, guess + np.log(2))] * dim + [(np.log(_LEAST), np.log(3))]
     start = np.append(np.full(dim, guess), np.log(0.05))
