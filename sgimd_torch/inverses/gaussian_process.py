@@ -22,12 +22,12 @@ from sgimd_torch.memory.compiled import compiled
 from sgimd_torch.spaces import Array
 
 _BLAS: Final = ThreadpoolController()
-_ROOT5: Final = np.sqrt(5)
 _LEAST: Final = 1e-6  # least noise variance, relative to the kernel's; with less noise the matrix would be singular
 _TINY: Final = 1e-300
 _NOISES: Final = (_LEAST, 1e-4, 1e-3, 1e-2, 0.03, 0.1, 0.3, 1.0, 3.0)
 _SCALES: Final = (0.5, 1.0, 2.0)
 _ROUGH: Final = ((1.0, 0.0), *itertools.product((4.0, 12.0), (0.03, 0.1, 0.3, 0.6)))  # (finer, share)
+_SMOOTH: Final = np.array([1.0, 1.0, 0.0, 0.0])  # a `Kernel` without rough part
 _STEPS: Final = 30  # largest number of steps of the fit of lengths
 
 
@@ -51,11 +51,6 @@ class Kernel(NamedTuple):
     share: float
     noise: float
 
-    def __call__(self, squared: Array) -> Array:
-        """Covariances at these ``squared`` distances; 1 at distance 0."""
-        distances = self.scale * np.sqrt(squared)
-        return (1 - self.share) * _matern(distances) + self.share * _matern(self.finer * distances)
-
 
 def fit_lengths(inputs: Array, outcomes: Array) -> Array:
     """Most likely length scale ``(dim,)`` of each input, relative to its standard deviation.
@@ -67,7 +62,7 @@ def fit_lengths(inputs: Array, outcomes: Array) -> Array:
         inputs: ``(n, dim)`` of standard deviation 1; the time grows with n^3.
         outcomes: ``(n, outcome_dim)``, not all the same.
     """
-    n, dim = inputs.shape
+    dim = inputs.shape[1]
     deviations = outcomes - outcomes.mean(axis=0)
     deviations = deviations / deviations.std()
     guess = np.log(1.5 * np.sqrt(dim))
@@ -75,7 +70,8 @@ def fit_lengths(inputs: Array, outcomes: Array) -> Array:
 
     def loss(parameters: Array) -> tuple[float, Array]:
         scaled, noise = columns * np.exp(-parameters[:dim, None]), float(np.exp(parameters[dim]))
-        covariance, slopes = kernels.smooth(scaled, noise)
+        covariance, slopes = kernels.correlations(scaled, _SMOOTH)
+        covariance.flat[:: len(inputs) + 1] += noise
         # The lower half of an array of C is the upper half of an array of Fortran.
         factor, failed = dpotrf(covariance.T, lower=False, overwrite_a=True)
         if failed:
@@ -114,14 +110,3 @@ def choose_kernel(groups: Sequence[tuple[Array, Array]], noise: float) -> Kernel
     kernel, found = np.unravel_index(scores.argmax(), scores.shape)
     scale, finer, share, _ = grid[kernel].tolist()
     return Kernel(scale, finer, share, float(noises[found]))
-
-
-def squared_distances(one: Array, other: Array) -> Array:
-    """Squared distances ``(n, m)`` between the rows of two arrays."""
-    products = (one * one).sum(axis=1)[:, None] + (other * other).sum(axis=1) - 2 * one @ other.T
-    return np.maximum(products, 0)
-
-
-def _matern(distances: Array) -> Array:
-    """Matern 5/2 kernel."""
-    return (1 + _ROOT5 * distances + 5 / 3 * distances**2) * np.exp(-_ROOT5 * distances)

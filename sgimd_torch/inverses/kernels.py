@@ -7,6 +7,7 @@ Import this module through `compiled`: loading numba takes half a second.
 
 from __future__ import annotations
 
+import math
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -25,6 +26,9 @@ COINCIDENT: Final = 1e-12  # least spread of outcomes relative to their size; be
 TINY: Final = 1e-300
 SMALLEST: Final = float(np.finfo(float).tiny)
 ROOT5: Final = float(np.sqrt(5))
+LOG2: Final = math.log(2)
+LOG2_HIGH, LOG2_LOW = 0.693147180369123816, 1.90821492927058770e-10  # sum to log 2; n times the first is exact
+TERMS: Final = tuple(1 / math.factorial(k) for k in range(13, 0, -1))  # of the series of e^r, all but 1
 
 _FAST: Final = {"reassoc", "contract", "nsz", "arcp"}  # sums may be reordered; NaN and infinity keep their meaning
 _inner = njit(nogil=True, fastmath=_FAST)
@@ -77,17 +81,17 @@ def columns(table: Array, rows: np.ndarray) -> Array:
     return found
 
 
-@_inner
+@njit(nogil=True)
 def exponential(x: float) -> float:
-    """e^x for x <= 0, with a relative error of 1e-13: the series of e^(x/1024), squared ten times. Unlike `np.exp`, it
-    is computed for several x at once, in a third of the time; an answer takes four fifths of its time."""
-    x = max(x, -700.0) / 1024
-    found = 1 + x / 7
-    for k in (6, 5, 4, 3, 2, 1):
-        found = 1 + x / k * found
-    for _ in range(10):
-        found *= found
-    return found
+    """e^x = 2^n e^r for x <= 0. Numba computes several at once, so each takes a quarter of the time of `np.exp`, and an
+    answer four fifths."""
+    x = max(x, -700.0)
+    n = np.rint(x / LOG2)
+    r = x - n * LOG2_HIGH - n * LOG2_LOW
+    series = 0.0
+    for term in TERMS:
+        series = (series + term) * r
+    return (1 + series) * np.int64((np.int64(n) + 1023) << 52).view(np.float64)
 
 
 @_inner
@@ -116,10 +120,10 @@ def covariances(inputs: Array, kernel: Array, point: Array, covariance: Array, s
         covariance[j], slope[j] = value, scale**2 * by_distance
 
 
-@_inner
+@_called(_table, _numbers)
 def correlations(inputs: Array, kernel: Array) -> tuple[Array, Array]:
-    """Covariance matrix ``(n, n)`` of ``inputs`` ``(dim, n)``, without noise, and the slopes of `covariances`; the lower
-    halves alone."""
+    """Covariance matrix ``(n, n)`` of ``inputs`` ``(dim, n)``, without noise, and its slopes, see `covariances`; the
+    lower halves alone."""
     n = inputs.shape[1]
     found, slopes = np.zeros((n, n)), np.empty((n, n))
     for i in range(n):
@@ -401,7 +405,7 @@ def scores(inputs: Array, outcomes: Array, kernels: Array, noises: Array, stated
     m, n = outcomes.shape
     found = np.empty((len(kernels), len(noises)))
     for g in range(len(kernels)):
-        (covariance, _), noise = correlations(inputs.copy(), kernels[g]), 0.0
+        (covariance, _), noise = correlations(inputs, kernels[g]), 0.0
         for a in range(len(noises)):
             for i in range(n):
                 covariance[i, i] += noises[a] - noise
@@ -421,16 +425,6 @@ def scores(inputs: Array, outcomes: Array, kernels: Array, noises: Array, stated
     return found
 
 
-@_called(_table, _number)
-def smooth(inputs: Array, noise: float) -> tuple[Array, Array]:
-    """Covariance matrix of ``inputs`` ``(dim, n)`` under the smooth kernel alone, with noise, and its slopes; the lower
-    halves alone, see `correlations`."""
-    covariance, slopes = correlations(inputs.copy(), np.array([1.0, 1.0, 0.0, 0.0]))
-    for i in range(len(covariance)):
-        covariance[i, i] += noise
-    return covariance, slopes
-
-
 @_called(_table, _table, _table, _table, _number)
 def gradient(inputs: Array, inverse: Array, weights: Array, slopes: Array, variance: float) -> tuple[Array, float]:
     """Derivatives of half the deviance (5.9 in Rasmussen & Williams) by log lengths ``(dim,)``, and by the noise.
@@ -439,7 +433,7 @@ def gradient(inputs: Array, inverse: Array, weights: Array, slopes: Array, varia
         inputs: ``(dim, n)``, in lengths.
         inverse: ``(n, n)``, inverse covariance; the lower half alone.
         weights: ``(outcome_dim, n)``, inverse covariance times outcomes.
-        slopes: see `correlations`.
+        slopes: ``(n, n)``, slopes of the covariances; the lower half alone.
         variance: most likely variance.
     """
     n, m = len(inverse), len(weights)
