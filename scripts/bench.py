@@ -47,15 +47,13 @@ Measurement = Callable[[Path, int], Figures]
 
 
 class SlowArm(PlanarArm):
-    """An arm whose movement takes 20 ms of processor time, as that of a simulator; it moves one by one."""
+    """An arm whose movement takes 20 ms; it moves one by one."""
 
     execute_many = None  # type: ignore[assignment]
 
     def execute(self, context: Any, theta: Any, rng: np.random.Generator) -> Any:
         """The outcome, after 20 ms."""
-        until = time.thread_time() + 0.02
-        while time.thread_time() < until:
-            pass
+        time.sleep(0.02)
         return super().execute(context, theta, rng)
 
 
@@ -214,6 +212,9 @@ def main() -> int:
             if packed.returncode:
                 parser.error(f"--against must be a commit with sgimd_torch in it, got {options.against}")
             subprocess.run(["tar", "-x", "-C", folder], input=packed.stdout, check=True)
+        for library in libraries:  # older commits have nothing to compile
+            compiling = "from sgimd_torch.memory.compiled import compile_all; compile_all()"
+            subprocess.run([sys.executable, "-c", compiling], env=environment(library), stderr=subprocess.DEVNULL)
         print(f"{'':56}" + "".join(f"{name:>12}" for name in ("here", "there", "here/there")[: 2 * len(libraries) - 1]))
         work = [(part, measure) for part in options.only for measure in PARTS[part][0]]
         for part, measure in tqdm(work, leave=False, disable=None):
