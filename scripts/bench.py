@@ -26,7 +26,7 @@ import time
 from collections.abc import Callable
 from contextlib import closing
 from functools import partial
-from itertools import product
+from itertools import islice, product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -107,13 +107,13 @@ def live(name: str, movements: int) -> Figures:
             theta = robot.policies.clip(thetas[k % REAL] + off * rng.normal(size=thetas.shape[1]))
             memory.add(empty, theta, outcomes[k % REAL] + off * rng.normal(size=2))
         learner = make(robot, 1, memory=memory, **taught)
-        fit = seconds(lambda learner=learner: learner.inverse(empty, outcomes[0]))
+        fit = seconds(partial(learner.inverse, empty, outcomes[0]))
         robot.execute = timed
         teacher = PeriodicTeacher(shown, stream(0, "teacher")) if taught else None
         life, each, physics = run(learner, robot, 1, movements=10**9, teacher=teacher), [], seconds(cast)
         for _ in range(movements):
             of_robot = 0.0
-            spent = seconds(lambda life=life: next(life))
+            spent = seconds(partial(next, life))
             each.append(spent - of_robot)
         physics = 1000 * min(physics, seconds(cast)) / 20
         robot.execute = execute
@@ -138,7 +138,7 @@ def at_once(movements: int) -> Figures:
                 life = run(practice(robot, 0), robot, 0, movements=10**9, execute=execute, at_once=number)
                 for _ in range(JOINS_EVERY * number):  # all robots join, processes start
                     next(life)
-                spent = seconds(lambda life=life: [next(life) for _ in range(movements)], time.perf_counter)
+                spent = seconds(partial(list, islice(life, movements)), time.perf_counter)
             figures[f"practice on {name}, {number} at once (movements/s)"] = movements / spent
     return figures
 
