@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from threading import Lock
-from typing import Final
+from typing import Final, NamedTuple, Self
 
 import faiss
 import numpy as np
@@ -78,7 +78,7 @@ class TreeNeighbours:
         self.keys = keys
         self._tree: cKDTree | None = None
         self._n_in_tree = 0
-        self._last = b"", Found(keys.rows[:0], 0), 0  # last query, its neighbours, and how many rows were compared
+        self._last = b"", Found.none(keys.rows[:0], 0), 0  # last query, its neighbours, and how many rows were compared
 
     def nearest(self, query: Array, k: int) -> Rows:
         """The ``(min(k, n),)`` rows nearest to ``query`` ``(dim,)``, nearest first. If the query is that of the last
@@ -89,12 +89,12 @@ class TreeNeighbours:
         """
         _check_k(k)
         keys, n = self.keys.rows, len(self.keys)
-        asked, found, seen = self._last
-        if asked != query.tobytes() or k > found.rows.shape[1]:
+        (asked, found, seen), key = self._last, query.tobytes()
+        if asked != key or k > found.rows.shape[1]:
             found = self._seek(query, max(k, LISTED))
         elif seen < n:
             found = found.copy().extend(keys, seen)
-        self._last = query.tobytes(), found, n
+        self._last = key, found, n
         return found.rows[0, : min(k, n)]
 
     def _seek(self, query: Array, k: int) -> Found:
@@ -103,7 +103,7 @@ class TreeNeighbours:
             # The two options do not change results; while they are off, the tree is built twice as fast.
             self._tree, self._n_in_tree = cKDTree(keys, balanced_tree=False, compact_nodes=False), n
         if self._tree is None:
-            return Found(query[None], k).extend(keys)
+            return Found.none(query[None], k).extend(keys)
         n_proposed = min(k + _SPARE, self._tree.n)
         distances, proposed = self._tree.query(query, n_proposed)
         beyond = distances[-1] if n_proposed < self._tree.n else np.inf  # least distance of the other rows of the tree
@@ -125,7 +125,7 @@ class PolicyNeighbours:
         self.keys = keys
         self._cells: faiss.Index | None = None
         # Neighbours of each row, found among its first ``_seen`` rows.
-        self._lists, self._seen, self._extending = Found(keys.rows[:0], LISTED), np.empty(0, np.int64), Lock()
+        self._lists, self._seen, self._extending = Found.none(keys.rows[:0], LISTED), np.empty(0, np.int64), Lock()
 
     def nearest(self, queries: Array, k: int, within: float = np.inf) -> Rows:
         """For each of ``queries`` ``(m, dim)`` the ``(min(k, n),)`` nearest rows, nearest first; -1 instead of rows
@@ -137,7 +137,7 @@ class PolicyNeighbours:
         _check_k(k)
         keys = self.keys.rows
         if len(keys) <= EXACT_UP_TO:
-            return Found(queries, min(k, len(keys))).extend(keys).within(within)
+            return Found.none(queries, min(k, len(keys))).extend(keys).within(within)
         return np.concatenate([found.within(within) for found in self._from_cells(queries, k)])
 
     def around(self, rows: Rows, k: int, within: float = np.inf) -> Rows:
@@ -153,10 +153,13 @@ class PolicyNeighbours:
         with self._extending:
             lists = self._lists
             if n > len(self._seen):
-                more = Found(keys, LISTED)
+                more = Found.none(keys, LISTED)
                 self._seen = np.concatenate((self._seen, np.zeros(n, np.int64)))
-                lists.rows = np.concatenate((lists.rows, more.rows))
-                lists.squared = np.concatenate((lists.squared, more.squared))
+                rows_so_far, squared = (
+                    np.concatenate((lists.rows, more.rows)),
+                    np.concatenate((lists.squared, more.squared)),
+                )
+                self._lists = lists = Found(lists.queries, rows_so_far, squared)
             compiled("sgimd_torch.memory.scan").scan_around(keys, rows, self._seen, lists.rows, lists.squared)
             return np.ascontiguousarray(lists.within(within, rows)[:, : min(k, n)])
 
@@ -171,32 +174,36 @@ class PolicyNeighbours:
         for query, rows in zip(queries, np.sort(proposed, axis=1), strict=True):
             rows = rows[rows >= 0]
             if len(rows) < k:  # the cells are nearly empty, or the query overflows float32
-                yield Found(query[None], k).extend(keys)
+                yield Found.none(query[None], k).extend(keys)
             else:
                 yield _among(keys, query, k, rows)
 
 
-class Found:
-    """Rows nearest to some queries ``(m, dim)`` among the rows seen so far, nearest first.
+class Found(NamedTuple):
+    """Rows nearest to some queries among the rows seen so far, nearest first.
 
     Attributes:
+        queries: ``(m, dim)``.
         rows: ``(m, k)``; -1 while fewer than k rows were seen.
         squared: ``(m, k)``, their squared distances; infinite while fewer than k rows were seen.
     """
 
-    def __init__(self, queries: Array, k: int) -> None:
-        self._queries = queries
-        self.rows, self.squared = np.full((len(queries), k), -1), np.full((len(queries), k), np.inf)
+    queries: Array
+    rows: Rows
+    squared: Array
+
+    @classmethod
+    def none(cls, queries: Array, k: int) -> Self:
+        """Lists of k rows, before any row was seen."""
+        return cls(queries, np.full((len(queries), k), -1), np.full((len(queries), k), np.inf))
 
     def copy(self) -> Found:
         """A copy that `extend` changes alone."""
-        same = Found(self._queries, 0)
-        same.rows, same.squared = self.rows.copy(), self.squared.copy()
-        return same
+        return Found(self.queries, self.rows.copy(), self.squared.copy())
 
     def extend(self, keys: Array, first: int = 0) -> Found:
         """Add the rows of ``keys`` ``(n, dim)`` from row ``first`` on."""
-        compiled("sgimd_torch.memory.scan").scan(keys, first, self._queries, self.rows, self.squared)
+        compiled("sgimd_torch.memory.scan").scan(keys, first, self.queries, self.rows, self.squared)
         return self
 
     def within(self, radius: float, queries: Rows | slice = slice(None)) -> Rows:
@@ -206,7 +213,7 @@ class Found:
 
 def _among(keys: Array, query: Array, k: int, proposed: Rows) -> Found:
     """The rows nearest to a query among the increasing rows ``proposed``."""
-    found = Found(query[None], k).extend(keys[proposed])
+    found = Found.none(query[None], k).extend(keys[proposed])
     n = min(k, len(proposed))
     found.rows[0, :n] = proposed[found.rows[0, :n]]
     return found
