@@ -1,16 +1,17 @@
-"""Measure time and memory of the library: of this checkout alone (here), or also of another commit (there).
+"""Measure what the library costs: this checkout alone (here), or also another commit (there).
 
 Each figure is measured in turns (here, there, here, there ...), each time in a new process. The table has the medians
-and their ratio. Times are processor times; other programs still lengthen them, because they empty the caches.
+and their ratio. Times are processor times unless a clock is named; other programs lengthen them, too.
 
-  learning  a learner's time for a movement, without the robot's time; the learner's time divided by the robot's; a
-            checksum of all outcomes, which is equal if both commits learn equally
-  resume    time of a run on the fishing rod, and of the replay of this run
-  life      a long run on a planar arm of 7 joints: time, largest memory of the process, size of the run's folder
+  learning  a learner's time for a movement, without the robot's, with 250 to 20,000 exemplars in memory: the mean of
+            the fastest 90 of 100 movements; its ratio to the rod's physics in the same process; and this ratio with
+            fits of the local process, one whenever the memory has grown by half
+  at-once   movements a second by the clock, with several robots at once (here alone)
+  run       `sgimd run` of practice on the fishing rod, and the times of its parts by the clock
 
 Examples:
-  python scripts/bench.py                                          this checkout alone; takes some minutes
-  python scripts/bench.py --against main --only learning resume    this checkout and the commit main
+  python scripts/bench.py                                         this checkout alone; takes some minutes
+  python scripts/bench.py --against f7c5dbb --only learning run   this checkout and the commit f7c5dbb
 """
 
 from __future__ import annotations
@@ -18,12 +19,14 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import sqlite3
 import subprocess
 import sys
 import time
-import zlib
 from collections.abc import Callable
+from contextlib import closing
 from functools import partial
+from itertools import islice, product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -32,34 +35,58 @@ import numpy as np
 from jsonargparse.typing import PositiveInt
 from tqdm import tqdm
 
+from sgimd_torch.environments.planar_arm import PlanarArm
+
 HERE = Path(__file__).resolve().parents[1]
-LIVES = ("random-25", "sagg-riac-25", "sgim-d-25", "practice-25", "practice-50", "practice-rod")
+LIVES = [
+    f"{algorithm}-{robot}" for algorithm, robot in product(("practice", "sgim-d", "sagg-riac"), ("rod", "7", "50"))
+]
+SIZES, REAL = (250, 1000, 5000, 20_000), 1000  # numbers of exemplars; the first 1000 are those of a life
 Figures = dict[str, float]
 Measurement = Callable[[Path, int], Figures]
 
 
+class SlowArm(PlanarArm):
+    """An arm whose movement takes 20 ms; it moves one by one."""
+
+    execute_many = None  # type: ignore[assignment]
+
+    def execute(self, context: Any, theta: Any, rng: np.random.Generator) -> Any:
+        """The outcome, after 20 ms."""
+        time.sleep(0.02)
+        return super().execute(context, theta, rng)
+
+
+def seconds(work: Callable[[], Any], clock: Callable[[], float] = time.process_time) -> float:
+    """Time of a piece of work."""
+    begun = clock()
+    work()
+    return clock() - begun
+
+
 def live(name: str, movements: int) -> Figures:
-    """Figures of a learner with the library that this process imports.
+    """Times of a learner with the library that this process imports.
 
     Args:
         name: algorithm and robot, one of ``LIVES``; a number is the number of joints of a planar arm.
-        movements: number of movements of the learner.
+        movements: number of movements that are measured.
     """
     import sgimd_torch
-    from sgimd_torch import Demonstration, FishingRod, PeriodicTeacher, PlanarArm, run, stream
+    from sgimd_torch import Demonstration, FishingRod, Memory, PeriodicTeacher, practice, run, stream
 
     algorithm, _, joints = name.rpartition("-")
-    robot: Any = FishingRod() if joints == "rod" else PlanarArm(int(joints), noise=0.02)
-    make = getattr(sgimd_torch, {"random": "random_exploration"}.get(algorithm, algorithm.replace("-", "_")))
-    teacher, taught = None, dict[str, Any]()
-    if algorithm == "sgim-d":
-        context, rng = np.zeros(0), stream(0, "bench")
-        shown = [
-            Demonstration(context, np.arange(2.0), np.stack((theta, theta)), robot.execute(context, theta, rng))
-            for theta in rng.random((100, int(joints)))
-        ]
-        teacher, taught = PeriodicTeacher(shown, stream(0, "teacher")), {"correspondence": lambda times, path: path[-1]}
-    learner, execute, of_robot = make(robot, 0, **taught), robot.execute, 0.0
+    rod = FishingRod(threads=1)
+    robot: Any = rod if joints == "rod" else PlanarArm(int(joints), noise=0.02)
+    make, first = getattr(sgimd_torch, algorithm.replace("-", "_")), practice(robot, 0)
+    for _ in run(first, robot, 0, movements=REAL):
+        pass
+    thetas, outcomes, empty, rng = first.memory.thetas, first.memory.outcomes, np.zeros(0), stream(0, "bench")
+    shown = [
+        Demonstration(empty, np.arange(2.0), np.stack((theta, theta)), outcome)
+        for theta, outcome in zip(thetas[:100], outcomes, strict=False)
+    ]
+    taught: dict[str, Any] = {"correspondence": lambda times, path: path[-1]} if algorithm == "sgim-d" else {}
+    execute, of_robot = robot.execute, 0.0
 
     def timed(*arguments: Any) -> Any:
         nonlocal of_robot
@@ -68,75 +95,98 @@ def live(name: str, movements: int) -> Figures:
         of_robot += time.process_time() - begun
         return outcome
 
-    robot.execute = timed
-    checksum, begun = 0, time.process_time()
-    for episode in run(learner, robot, 0, movements=movements, teacher=teacher):
-        checksum = zlib.crc32(np.asarray(episode.outcome).tobytes(), checksum)
-    learning = time.process_time() - begun - of_robot
-    return {
-        f"{name} (ms a movement)": 1000 * learning / movements,
-        f"{name}, learning over robot": learning / of_robot,
-        f"{name}, checksum": checksum,
-    }
+    def cast() -> None:
+        for theta in stream(1, "bench").random((20, 25)):
+            FishingRod.execute(rod, empty, theta, rng)
+
+    figures: Figures = {}
+    for n in SIZES:
+        memory = Memory(0, thetas.shape[1], 2)
+        for k in range(n):  # beyond those of the life, neighbours of them
+            off = 0.01 if k >= REAL else 0.0
+            theta = robot.policies.clip(thetas[k % REAL] + off * rng.normal(size=thetas.shape[1]))
+            memory.add(empty, theta, outcomes[k % REAL] + off * rng.normal(size=2))
+        learner = make(robot, 1, memory=memory, **taught)
+        fit = seconds(partial(learner.inverse, empty, outcomes[0]))
+        robot.execute = timed
+        teacher = PeriodicTeacher(shown, stream(0, "teacher")) if taught else None
+        life, each, physics = run(learner, robot, 1, movements=10**9, teacher=teacher), [], seconds(cast)
+        for _ in range(movements):
+            of_robot = 0.0
+            spent = seconds(partial(next, life))
+            each.append(spent - of_robot)
+        physics = 1000 * min(physics, seconds(cast)) / 20
+        robot.execute = execute
+        learning = 1000 * float(np.sort(each)[: 1 + 9 * movements // 10].mean())
+        where = f"{name}, {n} exemplars"
+        figures[f"{where} (ms)"] = learning
+        figures[f"{where}, over the rod's physics"] = learning / physics
+        figures[f"{where}, with fits"] = (learning + 1000 * fit / (n / 3)) / physics
+    return figures
 
 
-def measured(name: str, library: Path, movements: int) -> Figures:
-    """Figures of a learner in a new process that imports ``library``."""
+def at_once(movements: int) -> Figures:
+    """Movements a second by the clock, with several robots at once."""
+    from sgimd_torch import FishingRod, practice, run
+    from sgimd_torch.runs.at_once import executing
+    from sgimd_torch.session import JOINS_EVERY
+
+    figures: Figures = {}
+    for name, robot, numbers in (("rod", FishingRod(), (1, 2, 8)), ("an arm of 20 ms", SlowArm(7, noise=0.02), (1, 2))):
+        for number in numbers:
+            with executing(robot, 0, number) as execute:
+                life = run(practice(robot, 0), robot, 0, movements=10**9, execute=execute, at_once=number)
+                for _ in range(JOINS_EVERY * number):  # all robots join, processes start
+                    next(life)
+                spent = seconds(partial(list, islice(life, movements)), time.perf_counter)
+            figures[f"practice on {name}, {number} at once (movements/s)"] = movements / spent
+    return figures
+
+
+def in_child(name: str, library: Path, movements: int) -> Figures:
+    """Figures of a new process that imports ``library``."""
     command = [sys.executable, __file__, "--child", name, "--movements", str(movements)]
     done = subprocess.run(command, env=environment(library), stdout=subprocess.PIPE, text=True, check=True)
     return dict(json.loads(done.stdout))
 
 
-def resume(library: Path, movements: int) -> Figures:
-    """Times of a taught run, and of its replay; both times include the start of the process."""
+def whole_run(library: Path, movements: int) -> Figures:
+    """Processor time of a run of practice on the rod as a user types it, all included, and the seconds of its parts."""
+    command = [sys.executable, "-m", "sgimd_torch", "run", "--algorithm=practice", f"--movements={movements}"]
     with TemporaryDirectory() as folder:
-        words = "--algorithm=practice-taught", f"--movements={movements}"
-        fresh, _ = command_line(library, folder, *words)
-        replay, _ = command_line(library, folder, *words, "--resume")
-    return {"run on the rod (s)": fresh, "its replay (s)": replay, "replay over run": replay / fresh}
+        process = subprocess.Popen(command, cwd=folder, env=environment(library, {}), stdout=subprocess.DEVNULL)
+        _, status, used = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        if process.returncode:
+            raise RuntimeError(f"{' '.join(command)} failed, see above")
+        (file,) = Path(folder).rglob("run.sqlite")
+        with closing(sqlite3.connect(file)) as record:  # `read_run` may not know the layout of the other commit
+            ((parts,),) = record.execute("SELECT value FROM about WHERE name = 'seconds'")
+    shares = {
+        f"its {name.removeprefix('seconds_')} (s by the clock)": spent for name, spent in json.loads(parts).items()
+    }
+    return {"run on the rod (s)": used.ru_utime + used.ru_stime, **shares}
 
 
-def long_life(library: Path, movements: int) -> Figures:
-    """Figures of a run on an arm of 7 joints, whose physics takes hardly any time."""
-    with TemporaryDirectory() as folder:
-        words = ("--environment=planar-arm-7", f"--movements={movements}", f"--evaluate-at=[{movements}]")
-        seconds, memory = command_line(library, folder, *words)
-        size = sum(path.stat().st_size for path in Path(folder).rglob("*") if path.is_file()) / 1e6
-    return {"life on an arm (s)": seconds, "its largest memory (MiB)": memory, "its folder (MB)": size}
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
-def command_line(library: Path, folder: str, *words: str) -> tuple[float, float]:
-    """Processor time (s) and largest memory (MiB) of ``sgimd run`` in a folder."""
-    command = [sys.executable, "-m", "sgimd_torch", "run", "--out=runs", *words]
-    process = subprocess.Popen(command, cwd=folder, env=environment(library), stdout=subprocess.DEVNULL)
-    _, status, used = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    if process.returncode:
-        raise RuntimeError(f"{' '.join(command)} failed, see above")
-    kilobytes = used.ru_maxrss / (1024 if sys.platform == "darwin" else 1)
-    return used.ru_utime + used.ru_stime, kilobytes / 1024
-
-
-def environment(library: Path) -> dict[str, str]:
-    """Variables of a process that imports ``library`` and computes with one thread."""
-    one = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-    return {**os.environ, **one, "PYTHONPATH": str(library)}
+def environment(library: Path, more: dict[str, str] = ONE_THREAD) -> dict[str, str]:
+    """Variables of a process that imports ``library``."""
+    return {**os.environ, **more, "PYTHONPATH": str(library)}
 
 
 def show(name: str, several: list[list[float]]) -> None:
     """Print the medians of each commit, and the ratio of the medians here to those there."""
-    if name.endswith("checksum"):
-        cells = ["equal" if len({value for values in several for value in values}) == 1 else "DIFFERENT"]
-    else:
-        medians = [float(np.median(values)) for values in several]
-        cells = [f"{median:.4g}" for median in medians] + [f"{medians[0] / medians[-1]:.3f}"] * (len(medians) - 1)
-    print(f"{name:45}" + "".join(f"{cell:>12}" for cell in cells), flush=True)
+    medians = [float(np.median(values)) for values in several]
+    cells = [f"{median:.4g}" for median in medians] + [f"{medians[0] / medians[-1]:.3f}"] * (len(medians) - 1)
+    print(f"{name:56}" + "".join(f"{cell:>12}" for cell in cells), flush=True)
 
 
 PARTS: dict[str, tuple[list[Measurement], int]] = {  # measurements by name of the part, and their number of movements
-    "learning": ([partial(measured, name) for name in LIVES], 2000),
-    "resume": ([resume], 5000),
-    "life": ([long_life], 100_000),
+    "learning": ([partial(in_child, name) for name in LIVES], 100),
+    "at-once": ([partial(in_child, "at-once")], 400),
+    "run": ([whole_run], 2000),
 }
 
 
@@ -147,10 +197,11 @@ def main() -> int:
     parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS), metavar="PART", help=", ".join(PARTS))
     parser.add_argument("--rounds", type=PositiveInt, default=3, help="repetitions of each figure (default: 3)")
     parser.add_argument("--movements", type=PositiveInt, help="number of movements of each run (default: by part)")
-    parser.add_argument("--child", choices=LIVES, help=argparse.SUPPRESS)
+    parser.add_argument("--child", choices=[*LIVES, "at-once"], help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.child:
-        print(json.dumps(live(options.child, options.movements)))
+        measured = at_once if options.child == "at-once" else partial(live, options.child)
+        print(json.dumps(measured(options.movements)))
         return 0
     with TemporaryDirectory() as folder:
         libraries = [HERE]
@@ -161,10 +212,14 @@ def main() -> int:
             if packed.returncode:
                 parser.error(f"--against must be a commit with sgimd_torch in it, got {options.against}")
             subprocess.run(["tar", "-x", "-C", folder], input=packed.stdout, check=True)
-        print(f"{'':45}" + "".join(f"{name:>12}" for name in ("here", "there", "here/there")[: 2 * len(libraries) - 1]))
-        work = [(measure, options.movements or PARTS[part][1]) for part in options.only for measure in PARTS[part][0]]
-        for measure, movements in tqdm(work, leave=False, disable=None):
-            figures = [[measure(library, movements) for library in libraries] for _ in range(options.rounds)]
+        for library in libraries:  # older commits have nothing to compile
+            compiling = "from sgimd_torch.memory.compiled import compile_all; compile_all()"
+            subprocess.run([sys.executable, "-c", compiling], env=environment(library), stderr=subprocess.DEVNULL)
+        print(f"{'':56}" + "".join(f"{name:>12}" for name in ("here", "there", "here/there")[: 2 * len(libraries) - 1]))
+        work = [(part, measure) for part in options.only for measure in PARTS[part][0]]
+        for part, measure in tqdm(work, leave=False, disable=None):
+            movements, compared = options.movements or PARTS[part][1], libraries[: 1 if part == "at-once" else 2]
+            figures = [[measure(library, movements) for library in compared] for _ in range(options.rounds)]
             for name in figures[0][0]:
                 show(name, [[found[name] for found in several] for several in zip(*figures, strict=True)])
     return 0

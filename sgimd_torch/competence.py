@@ -56,15 +56,16 @@ class Competence(Judge):
 
         Further calls with the same context and goal, as during an attempt, compare only newer exemplars.
         """
+        memory = self.problem.memory
+        if not len(memory):
+            return -1.0
         asked = context.tobytes(), goal.tobytes()
         if asked != self._asked:
-            self._nearest = self.problem.memory.nearest(context, goal)
-            self._asked, self._row, self._best = asked, None, -1.0
+            self._asked, self._row = asked, None
             self._far = max(float(_distance(goal, self.problem.rest)), self.problem.tolerance)
-        if (row := self._nearest.row) != self._row:
-            assert row is not None
+        if (row := int(memory.near_outcomes(context, goal, 1)[0])) != self._row:
             # `performance` without its general shapes, as each movement asks for it
-            missed = float(_distance(goal, self.problem.memory.outcomes[row]))
+            missed = float(_distance(goal, memory.outcomes[row]))
             self._row, self._best = row, -min(1.0, missed / self._far)
         return self._best
 

@@ -91,7 +91,7 @@ class GoalBabbling(Strategy):
         self.explore = Explore.of(explore, problem)
         self.goals = Goals.of(goals, problem)
         self.search = Search.of(search, problem)
-        self.judge = Judge.of(judge, problem)
+        self.judge = self.competence if judge is Competence else Judge.of(judge, problem)
         self.budget = check_count("budget", budget, 1)
         self.tolerance, self.global_range, self.give_up = tolerance, global_range, give_up
 

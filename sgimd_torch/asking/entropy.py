@@ -15,10 +15,11 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial.distance import cdist
 
 from sgimd_torch.asking.interest import AUTONOMOUS, StrategicGoals
 from sgimd_torch.goals.checks import check_attempt, check_in
-from sgimd_torch.inverses.gaussian_process import Kernel, one_thread, squared_distances
+from sgimd_torch.inverses.gaussian_process import one_thread
 from sgimd_torch.parts import Problem
 from sgimd_torch.spaces import Array, Box
 
@@ -26,7 +27,6 @@ _GOALS: Final = 30  # number of random goals over which entropy is averaged
 _KNOWN: Final = 400  # largest number of exemplars to which the Gaussian process is fitted
 _NOISE: Final = 0.1  # variance of the noise of one exemplar, in units of the prior variance
 _LENGTH: Final = 0.1  # length scale of the kernel, relative to the sides of C x T
-_KERNEL: Final = Kernel(1 / _LENGTH, 1.0, 0.0, _NOISE)
 
 
 @one_thread
@@ -43,10 +43,16 @@ def doubt(known: Array, points: Array) -> Array:
         ``(m, m)`` covariances, given the exemplars; 1 on the diagonal where nothing is known.
     """
     known = _thinned(known)
-    across = _KERNEL(squared_distances(points, known))
-    inner = _KERNEL(squared_distances(known, known)) + _NOISE * np.eye(len(known))
-    found: Array = _KERNEL(squared_distances(points, points)) - across @ np.linalg.solve(inner, across.T)
-    return found
+    across = _covariances(points, known)
+    inner = _covariances(known, known) + _NOISE * np.eye(len(known))
+    return _covariances(points, points) - across @ np.linalg.solve(inner, across.T)
+
+
+def _covariances(one: Array, other: Array) -> Array:
+    """Matern 5/2 kernel ``(n, m)`` between the rows of two arrays."""
+    distances = np.sqrt(5) * cdist(one, other) / _LENGTH
+    covariances: Array = (1 + distances + distances**2 / 3) * np.exp(-distances)
+    return covariances
 
 
 class EntropyGoals(StrategicGoals):
@@ -108,7 +114,7 @@ class EntropyGoals(StrategicGoals):
         if not tried:
             return points
         goals, missed = (np.array(each) for each in zip(*tried, strict=True))
-        landed = points + missed[squared_distances(points, goals).argmin(axis=1)]
+        landed = points + missed[cdist(points, goals).argmin(axis=1)]
         known = self._scaled(self.memory.contexts[:1], self.memory.outcomes[:1])
         found: Array = np.where(np.isnan(landed), known if len(known) else points, landed)
         return found

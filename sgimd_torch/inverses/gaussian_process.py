@@ -14,8 +14,7 @@ from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple, ParamSpec, TypeVar
 
 import numpy as np
-from scipy.linalg import cho_solve, cholesky
-from scipy.linalg.lapack import dpotri
+from scipy.linalg.lapack import dpotrf, dpotri, dpotrs
 from scipy.optimize import minimize
 from threadpoolctl import ThreadpoolController
 
@@ -23,12 +22,12 @@ from sgimd_torch.memory.compiled import compiled
 from sgimd_torch.spaces import Array
 
 _BLAS: Final = ThreadpoolController()
-_ROOT5: Final = np.sqrt(5)
 _LEAST: Final = 1e-6  # least noise variance, relative to the kernel's; with less noise the matrix would be singular
 _TINY: Final = 1e-300
 _NOISES: Final = (_LEAST, 1e-4, 1e-3, 1e-2, 0.03, 0.1, 0.3, 1.0, 3.0)
 _SCALES: Final = (0.5, 1.0, 2.0)
 _ROUGH: Final = ((1.0, 0.0), *itertools.product((4.0, 12.0), (0.03, 0.1, 0.3, 0.6)))  # (finer, share)
+_SMOOTH: Final = np.array([1.0, 1.0, 0.0, 0.0])  # a `Kernel` without rough part
 _STEPS: Final = 30  # largest number of steps of the fit of lengths
 
 
@@ -52,11 +51,6 @@ class Kernel(NamedTuple):
     share: float
     noise: float
 
-    def __call__(self, squared: Array) -> Array:
-        """Covariances at these ``squared`` distances; 1 at distance 0."""
-        distances = self.scale * np.sqrt(squared)
-        return (1 - self.share) * _matern(distances) + self.share * _matern(self.finer * distances)
-
 
 def fit_lengths(inputs: Array, outcomes: Array) -> Array:
     """Most likely length scale ``(dim,)`` of each input, relative to its standard deviation.
@@ -68,32 +62,29 @@ def fit_lengths(inputs: Array, outcomes: Array) -> Array:
         inputs: ``(n, dim)`` of standard deviation 1; the time grows with n^3.
         outcomes: ``(n, outcome_dim)``, not all the same.
     """
-    n, dim = inputs.shape
+    dim = inputs.shape[1]
     deviations = outcomes - outcomes.mean(axis=0)
     deviations = deviations / deviations.std()
     guess = np.log(1.5 * np.sqrt(dim))
-    squares = inputs * inputs
+    columns, kernels = np.ascontiguousarray(inputs.T), compiled("sgimd_torch.inverses.kernels")
 
     def loss(parameters: Array) -> tuple[float, Array]:
-        shrunk, noise = np.exp(-parameters[:dim]), float(np.exp(parameters[dim]))
-        scaled = inputs * shrunk
-        distances = _ROOT5 * np.sqrt(squared_distances(scaled, scaled))
-        decay = np.exp(-distances)
-        covariance = (1 + distances * (1 + distances / 3)) * decay  # Matern 5/2
-        covariance.flat[:: n + 1] += noise
-        factor = cholesky(covariance, lower=True, overwrite_a=True, check_finite=False)
+        scaled, noise = columns * np.exp(-parameters[:dim, None]), float(np.exp(parameters[dim]))
+        covariance, slopes = kernels.correlations(scaled, _SMOOTH)
+        covariance.flat[:: len(inputs) + 1] += noise
+        # The lower half of an array of C is the upper half of an array of Fortran.
+        factor, failed = dpotrf(covariance.T, lower=False, overwrite_a=True)
+        if failed:
+            raise np.linalg.LinAlgError("the covariance is not positive definite")
         logs = np.log(np.diag(factor)).sum()
-        weights = cho_solve((factor, True), deviations, check_finite=False)
-        inverse, _ = dpotri(factor, lower=True, overwrite_c=True)  # its lower half
-        inverse = np.tril(inverse) + np.tril(inverse, -1).T
+        weights, _ = dpotrs(factor, deviations, lower=False)
+        inverse, _ = dpotri(factor, lower=False, overwrite_c=True)
         variance = (deviations * weights).mean()
-        by_covariance = 0.5 * (deviations.shape[1] * inverse - weights @ weights.T / variance)
-        by_square = by_covariance * (5 / 3 * (1 + distances) * decay)
+        by_lengths, by_noise = kernels.gradient(scaled, inverse.T, np.ascontiguousarray(weights.T), slopes, variance)
         off = (parameters[:dim] - guess) / 1.5
-        gradient = 2 * (by_square.sum(axis=1) @ squares - (inputs * (by_square @ inputs)).sum(axis=0)) * shrunk**2
         likelihood = 0.5 * deviations.size * np.log(variance) + deviations.shape[1] * logs
         value = float(likelihood + 0.5 * (off * off).sum())
-        return value, np.append(gradient + off / 1.5, noise * np.trace(by_covariance))
+        return value, np.append(by_lengths + off / 1.5, noise * by_noise)
 
     bounds = [(guess - 5, guess + np.log(2))] * dim + [(np.log(_LEAST), np.log(3))]
     start = np.append(np.full(dim, guess), np.log(0.05))
@@ -119,14 +110,3 @@ def choose_kernel(groups: Sequence[tuple[Array, Array]], noise: float) -> Kernel
     kernel, found = np.unravel_index(scores.argmax(), scores.shape)
     scale, finer, share, _ = grid[kernel].tolist()
     return Kernel(scale, finer, share, float(noises[found]))
-
-
-def squared_distances(one: Array, other: Array) -> Array:
-    """Squared distances ``(n, m)`` between the rows of two arrays."""
-    products = (one * one).sum(axis=1)[:, None] + (other * other).sum(axis=1) - 2 * one @ other.T
-    return np.maximum(products, 0)
-
-
-def _matern(distances: Array) -> Array:
-    """Matern 5/2 kernel."""
-    return (1 + _ROOT5 * distances + 5 / 3 * distances**2) * np.exp(-_ROOT5 * distances)

@@ -12,10 +12,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.memory.neighbours import Found, PolicyNeighbours, Rows, Table, TreeNeighbours
+from sgimd_torch.memory.neighbours import PolicyNeighbours, Rows, Table, TreeNeighbours
 from sgimd_torch.spaces import Array, check_point
 
-__all__ = ["Memory", "Nearest", "Rows"]
+__all__ = ["Memory", "Rows"]
 
 _NO_CONTEXT: Final = "an environment without contexts gives np.zeros(0)"
 
@@ -100,11 +100,6 @@ class Memory:
         goal = check_point("goal", goal, self.outcome_dim, "was a theta passed instead?")
         return self._outcome_side.nearest(self._key(context, goal), k)
 
-    def nearest(self, context: ArrayLike, goal: ArrayLike) -> Nearest:
-        """The first row of :meth:`near_outcomes`, as an object that stays up to date while the memory grows."""
-        goal = check_point("goal", goal, self.outcome_dim, "was a theta passed instead?")
-        return Nearest(self._outcome_side, self._key(context, goal))
-
     def near_policies(self, context: ArrayLike, theta: ArrayLike, k: int, within: float = np.inf) -> Rows:
         """At most ``k`` rows whose contexts and thetas lie nearest to ``context`` and ``theta`` ``(theta_dim,)``, not
         farther than ``within``.
@@ -147,20 +142,3 @@ class Memory:
     def _key(self, context: ArrayLike, point: Array) -> Array:
         context = check_point("context", context, self.context_dim, _NO_CONTEXT)
         return np.concatenate((context, point)) if self.context_dim else point.copy()
-
-
-class Nearest:
-    """The row whose outcome lies nearest to one goal in one context; later looks compare only newer exemplars."""
-
-    def __init__(self, side: TreeNeighbours, key: Array) -> None:
-        self._side, self._key, self._seen = side, key, 0
-        self._found = Found(key[None], 1)
-
-    @property
-    def row(self) -> int | None:
-        """The nearest row, the oldest of equally near ones; None for an empty memory."""
-        seen, self._seen = self._seen, len(self._side.keys)
-        if seen < self._seen:
-            self._found.extend(self._side.keys.rows, seen if seen else int(self._side.nearest(self._key, 1)[0]))
-        found = int(self._found.rows[0, 0])
-        return None if found < 0 else found

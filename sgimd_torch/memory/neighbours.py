@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from threading import Lock
-from typing import Final
+from typing import Final, NamedTuple, Self
 
 import faiss
 import numpy as np
@@ -78,29 +78,41 @@ class TreeNeighbours:
         self.keys = keys
         self._tree: cKDTree | None = None
         self._n_in_tree = 0
+        self._last = b"", Found.none(keys.rows[:0], 0), 0  # last query, its neighbours, and how many rows were compared
 
     def nearest(self, query: Array, k: int) -> Rows:
-        """The ``(min(k, n),)`` rows nearest to ``query`` ``(dim,)``, nearest first.
+        """The ``(min(k, n),)`` rows nearest to ``query`` ``(dim,)``, nearest first. If the query is that of the last
+        call, only newer rows are compared.
 
         Raises:
             ValueError: ``k`` is below 1.
         """
         _check_k(k)
         keys, n = self.keys.rows, len(self.keys)
+        (asked, found, seen), key = self._last, query.tobytes()
+        if asked != key or k > found.rows.shape[1]:
+            found = self._seek(query, max(k, LISTED))
+        elif seen < n:
+            found = found.copy().extend(keys, seen)
+        self._last = key, found, n
+        return found.rows[0, : min(k, n)]
+
+    def _seek(self, query: Array, k: int) -> Found:
+        keys, n = self.keys.rows, len(self.keys)
         if n - self._n_in_tree > max(self._NEWEST, self._n_in_tree // 32):
             # The two options do not change results; while they are off, the tree is built twice as fast.
             self._tree, self._n_in_tree = cKDTree(keys, balanced_tree=False, compact_nodes=False), n
         if self._tree is None:
-            return Found(query[None], min(k, n)).extend(keys).rows[0]
+            return Found.none(query[None], k).extend(keys)
         n_proposed = min(k + _SPARE, self._tree.n)
         distances, proposed = self._tree.query(query, n_proposed)
         beyond = distances[-1] if n_proposed < self._tree.n else np.inf  # least distance of the other rows of the tree
-        found = _among(keys, query, min(k, n), np.sort(proposed)).extend(keys, self._n_in_tree)
+        found = _among(keys, query, k, np.sort(proposed)).extend(keys, self._n_in_tree)
         reach = math.sqrt(found.squared[0, -1]) * (1 + _ROUNDING)
         if reach >= beyond:
             ball = self._tree.query_ball_point(query, reach, return_sorted=True)
-            found = _among(keys, query, min(k, n), np.array(ball, dtype=np.int64)).extend(keys, self._n_in_tree)
-        return found.rows[0]
+            found = _among(keys, query, k, np.array(ball, dtype=np.int64)).extend(keys, self._n_in_tree)
+        return found
 
 
 class PolicyNeighbours:
@@ -113,7 +125,7 @@ class PolicyNeighbours:
         self.keys = keys
         self._cells: faiss.Index | None = None
         # Neighbours of each row, found among its first ``_seen`` rows.
-        self._lists, self._seen, self._extending = Found(keys.rows[:0], LISTED), np.empty(0, np.int64), Lock()
+        self._lists, self._seen, self._extending = Found.none(keys.rows[:0], LISTED), np.empty(0, np.int64), Lock()
 
     def nearest(self, queries: Array, k: int, within: float = np.inf) -> Rows:
         """For each of ``queries`` ``(m, dim)`` the ``(min(k, n),)`` nearest rows, nearest first; -1 instead of rows
@@ -125,7 +137,7 @@ class PolicyNeighbours:
         _check_k(k)
         keys = self.keys.rows
         if len(keys) <= EXACT_UP_TO:
-            return Found(queries, min(k, len(keys))).extend(keys).within(within)
+            return Found.none(queries, min(k, len(keys))).extend(keys).within(within)
         return np.concatenate([found.within(within) for found in self._from_cells(queries, k)])
 
     def around(self, rows: Rows, k: int, within: float = np.inf) -> Rows:
@@ -141,15 +153,15 @@ class PolicyNeighbours:
         with self._extending:
             lists = self._lists
             if n > len(self._seen):
-                more = Found(keys, LISTED)
+                more = Found.none(keys, LISTED)
                 self._seen = np.concatenate((self._seen, np.zeros(n, np.int64)))
-                lists.rows = np.concatenate((lists.rows, more.rows))
-                lists.squared = np.concatenate((lists.squared, more.squared))
-            found = Found(keys[rows], LISTED)
-            found.rows, found.squared = lists.rows[rows], lists.squared[rows]
-            found.extend(keys, self._seen[rows])
-            lists.rows[rows], lists.squared[rows], self._seen[rows] = found.rows, found.squared, n
-        return np.ascontiguousarray(found.within(within)[:, : min(k, n)])
+                rows_so_far, squared = (
+                    np.concatenate((lists.rows, more.rows)),
+                    np.concatenate((lists.squared, more.squared)),
+                )
+                self._lists = lists = Found(lists.queries, rows_so_far, squared)
+            compiled("sgimd_torch.memory.scan").scan_around(keys, rows, self._seen, lists.rows, lists.squared)
+            return np.ascontiguousarray(lists.within(within, rows)[:, : min(k, n)])
 
     def _from_cells(self, queries: Array, k: int) -> Iterator[Found]:
         """The rows nearest to each query in the cells nearest to it."""
@@ -162,37 +174,46 @@ class PolicyNeighbours:
         for query, rows in zip(queries, np.sort(proposed, axis=1), strict=True):
             rows = rows[rows >= 0]
             if len(rows) < k:  # the cells are nearly empty, or the query overflows float32
-                yield Found(query[None], k).extend(keys)
+                yield Found.none(query[None], k).extend(keys)
             else:
                 yield _among(keys, query, k, rows)
 
 
-class Found:
-    """Rows nearest to some queries ``(m, dim)`` among the rows seen so far, nearest first.
+class Found(NamedTuple):
+    """Rows nearest to some queries among the rows seen so far, nearest first.
 
     Attributes:
+        queries: ``(m, dim)``.
         rows: ``(m, k)``; -1 while fewer than k rows were seen.
         squared: ``(m, k)``, their squared distances; infinite while fewer than k rows were seen.
     """
 
-    def __init__(self, queries: Array, k: int) -> None:
-        self._queries = queries
-        self.rows, self.squared = np.full((len(queries), k), -1), np.full((len(queries), k), np.inf)
+    queries: Array
+    rows: Rows
+    squared: Array
 
-    def extend(self, keys: Array, first: int | Rows = 0) -> Found:
-        """Add the rows of ``keys`` ``(n, dim)`` from row ``first`` on, a number for all queries or for each."""
-        begin = np.full(len(self.rows), first)
-        compiled("sgimd_torch.memory.scan").scan(keys, begin, self._queries, self.rows, self.squared)
+    @classmethod
+    def none(cls, queries: Array, k: int) -> Self:
+        """Lists of k rows, before any row was seen."""
+        return cls(queries, np.full((len(queries), k), -1), np.full((len(queries), k), np.inf))
+
+    def copy(self) -> Found:
+        """A copy that `extend` changes alone."""
+        return Found(self.queries, self.rows.copy(), self.squared.copy())
+
+    def extend(self, keys: Array, first: int = 0) -> Found:
+        """Add the rows of ``keys`` ``(n, dim)`` from row ``first`` on."""
+        compiled("sgimd_torch.memory.scan").scan(keys, first, self.queries, self.rows, self.squared)
         return self
 
-    def within(self, radius: float) -> Rows:
-        """``rows``, with -1 instead of those farther than ``radius``."""
-        return self.rows if radius == np.inf else np.where(self.squared <= radius * radius, self.rows, -1)
+    def within(self, radius: float, queries: Rows | slice = slice(None)) -> Rows:
+        """``rows`` of these queries, as a copy, with -1 instead of those farther than ``radius``."""
+        return np.where(self.squared[queries] <= radius * radius, self.rows[queries], -1)
 
 
 def _among(keys: Array, query: Array, k: int, proposed: Rows) -> Found:
     """The rows nearest to a query among the increasing rows ``proposed``."""
-    found = Found(query[None], k).extend(keys[proposed])
+    found = Found.none(query[None], k).extend(keys[proposed])
     n = min(k, len(proposed))
     found.rows[0, :n] = proposed[found.rows[0, :n]]
     return found

@@ -128,7 +128,9 @@ def test_competence_asked_again_after_each_movement_is_that_of_a_fresh_look(cont
             expected = Competence(given)(context, goal)
             assert kept(context, goal) == expected
             near = memory.near_outcomes(context, goal, 1)
-            assert memory.nearest(context, goal).row == (int(near[0]) if len(near) else None)
+            fresh = memory.copy().near_outcomes(context, goal, 20)
+            assert near.tolist() == fresh[:1].tolist()
+            assert memory.near_outcomes(context, goal, 20).tolist() == fresh.tolist()
             for _ in range(int(rng.integers(0, 3))):
                 memory.add(rng.random(context_dim), np.zeros(1), np.round(rng.random(2), 1))  # rounded: many ties
             looks += 1
@@ -137,12 +139,10 @@ def test_competence_asked_again_after_each_movement_is_that_of_a_fresh_look(cont
 
 def test_the_nearest_outcome_asked_again_stays_the_oldest_of_equals() -> None:
     memory = Memory(0, 1, 1)
-    again = memory.nearest([], [0.0])
-    assert again.row is None
     rows = []
     for outcome in (3.0, -2.0, 2.0, 2.0, 1.0, -1.0, 0.0, 0.0):
         memory.add([], [0.0], [outcome])
-        rows.append(again.row)
+        rows.append(int(memory.near_outcomes([], [0.0], 1)[0]))
     assert rows == [0, 1, 1, 1, 4, 4, 6, 6]
 
 

@@ -217,19 +217,18 @@ def test_setup_refuses_another_word(setup):
     assert setup("demos", wanted=2) == []
 
 
+@pytest.mark.slow
 def test_the_bench_compares_two_commits_side_by_side(capsys, monkeypatch):
     measurements, movements = bench.PARTS["learning"]
-    monkeypatch.setitem(bench.PARTS, "learning", (measurements[1:3], movements))  # two lives are enough here
-    assert go(bench, "--only learning life --rounds 1 --movements 40 --against HEAD") == 0
+    monkeypatch.setitem(bench.PARTS, "learning", (measurements[1:2], movements))  # one learner is enough here
+    assert go(bench, "--only learning run --rounds 1 --movements 20 --against HEAD") == 0
     head, *lines = capsys.readouterr().out.splitlines()
     assert head.split() == ["here", "there", "here/there"]
-    assert len(lines) == 2 * 3 + 3
+    assert len(lines) == 4 * 3 + 1 + 3
     for line in lines:
-        if "checksum" in line:
-            assert line.endswith(" equal")
-        else:
-            here, there, ratio = map(float, line.split()[-3:])
-            assert ratio == pytest.approx(here / there, abs=0.01)
+        here, there, ratio = map(float, line.split()[-3:])
+        assert here > 0
+        assert ratio == pytest.approx(here / there, rel=0.01)
 
 
 def test_smaller_time_steps_of_the_rod_land_nearer_to_the_smallest(capsys):
