@@ -126,3 +126,25 @@ def test_runs_are_found_by_name_and_seed(tmp_path):
     assert [path.name for path in found["b"]] == ["seed-002", "seed-010"]
     assert find_runs(tmp_path / "b") == {"b": found["b"]}
     assert find_runs(found["b"][1]) == {"b": [found["b"][1]]}
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        "sgimd_torch.views.statistics:optimize._trustregion.scipy.signal._signaltools.timeit.timeit",
+        "sgimd_torch.files:os.getcwd",
+        "sgimd_torch.__main__:main",
+        "sgimd_torch.runs.tasks.robots:PlanarArm.__init__",
+    ],
+)
+def test_a_record_executes_no_code_without_trust_though_its_place_is_in_this_library(run, place):
+    found = read_run(run)
+    for name in ("environment", "algorithm"):
+        with pytest.raises(RunError, match="names code outside this library"):
+            config_of(replace(found, config={**found.config, name: place}))
+
+
+def test_a_place_of_the_catalogue_needs_no_trust(run):
+    found = read_run(run)
+    place = "sgimd_torch.runs.tasks.robots:planar_arm_7"
+    assert config_of(replace(found, config={**found.config, "environment": place}))["environment"] == place
