@@ -367,10 +367,13 @@ class Learner:
 
     def _within_pi(self, move: Move | None) -> Move | None:
         """The movement, which may go to a robot; a theta that is no point of Pi never does."""
-        if move is not None:
+        if move is None:
+            return move
+        pi, theta = self.problem.policies, move.theta
+        if theta.dtype != pi.low.dtype or theta.shape != pi.low.shape or not pi.contains(theta):  # quicker than check
             part = self.social if move.origin == "imitate" and self.social else self.autonomous.maker(move.origin)
             name = f"theta of the part {type(part).__name__}"
-            self.problem.policies.check(name, check_point(name, move.theta, self.memory.theta_dim))
+            pi.check(name, check_point(name, theta, pi.dim))
         return move
 
     def _checked(self, move: Move | Failure | None, outcome: ArrayLike | Failure | None) -> Array | Failure | None:
