@@ -80,8 +80,9 @@ def _reopened(
     """
     record = Record(path, write=True)
     try:
-        differ = _refuse_other(record, about, dims)
-        if damage := record.check():
+        damage = record.check()
+        differ = _refuse_other(record, about, dims, lost="about" in damage)
+        if damage:
             record.close()  # copying an open record would release its lock
             record = _salvaged(path, "; ".join(damage.values()), accept_loss, notes)
         if record.movements > config.movements:
@@ -89,7 +90,8 @@ def _reopened(
         _forget_evaluations(record, config, anew=bool(differ & {*EVALUATES}), notes=notes)
         for table in OF_MODEL:
             record.replace_rows(table, ())
-        about["versions"] = _with_earlier(record.about["versions"], about["versions"], notes)
+        if "versions" in record.about:
+            about["versions"] = _with_earlier(record.about["versions"], about["versions"], notes)
         record.settle(**about)
     except BaseException:
         record.close()
@@ -130,11 +132,15 @@ def _forget_evaluations(record: Record, config: Config, *, anew: bool, notes: li
             record.replace_rows(table, [row for row in record.rows(table) if row[0] in kept])
 
 
-def _refuse_other(record: Record, about: dict[str, Any], dims: Dims) -> set[str]:
-    """Refuse a record of another run; return the names of the settings that differ and are allowed to differ."""
-    if "settings" not in record.about:
+def _refuse_other(record: Record, about: dict[str, Any], dims: Dims, *, lost: bool) -> set[str]:
+    """Refuse a record of another run; return the names of the settings that differ and are allowed to differ.
+
+    If its settings are ``lost``, the replay finds out whether it is another run.
+    """
+    if "settings" not in record.about and not lost:
         raise RunError(f"{record.path} is a life that save_life wrote, not a run; choose another --out")
-    before, now = ({**each["settings"], **each["files"]} for each in (record.about, about))
+    known = about.keys() & record.about.keys() & {"settings", "files"}
+    before, now = ({name: v for k in known for name, v in each[k].items()} for each in (record.about, about))
     differ = [name for name in dict.fromkeys((*now, *before)) if before.get(name) != now.get(name)]
     if changed := [name for name in differ if name not in MAY_CHANGE]:
         raise RunError(

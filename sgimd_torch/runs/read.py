@@ -5,6 +5,7 @@ run = read_run("runs/sgim-d/seed-003"); run.outcomes, run.evaluation["mean_error
 
 from __future__ import annotations
 
+import json
 import os
 import re
 from array import array
@@ -118,7 +119,7 @@ def read_run(path: str | os.PathLike[str]) -> Run:
     if not (path / FILE).exists():
         raise RunError(f"{path} holds no run; runs are in OUT/NAME/seed-000 and have a file {FILE}")
     with Record(path / FILE) as record:
-        about = record.about
+        about = {name: json.loads(value) for name, value in record.rows("about")}
         if "settings" not in about:
             raise RunError(f"{path / FILE} is a life that save_life wrote, not a run")
         settings = about["settings"]

@@ -106,8 +106,10 @@ class Life:
     def close(self, *, keep: bool = True) -> None:
         """Close record and listeners; ``keep`` commits the last movements first."""
         try:
-            if keep and not self.replaying:
-                self._settle()
+            if keep and not self.replaying and not self._settle():
+                say(f"waiting until no other program reads {self.record.path}, to write the last movements")
+                while not self._settle():
+                    time.sleep(COMMIT_EVERY)
         finally:
             self.record.close()
             for each in self.listeners:
@@ -178,19 +180,19 @@ class Life:
         return self.movements == self.parts.learner.movements
 
     def commit(self) -> None:
-        """Write everything to the disk."""
-        self._settle()
-        for each in self.listeners:
-            each.flush()
+        """Write everything to the disk, unless another program is reading the record: then later."""
         self._committed = time.monotonic()
+        if self._settle():
+            for each in self.listeners:
+                each.flush()
 
     def _curves(self) -> dict[str, float]:
         """Numbers of the listeners for the board since the last call, by tag."""
         return {tag: value for each in self.listeners for tag, value in each.curves().items()}
 
-    def _settle(self) -> None:
+    def _settle(self) -> bool:
         self.record.settle(seconds=self.seconds.summary())
-        self.record.commit()
+        return self.record.commit(wait=False)
 
     def _after(self, episode: Episode) -> None:
         replayed = self.replaying

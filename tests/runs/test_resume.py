@@ -2,6 +2,7 @@
 
 import shutil
 import signal
+import sqlite3
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from sgimd_torch.inverses.locally_linear import LocallyLinear
 from sgimd_torch.learner.events import Kind
 from sgimd_torch.record import Record
 from sgimd_torch.runs import evaluations
+from sgimd_torch.runs import run as run_module
 from sgimd_torch.runs.directory import FILE
 from sgimd_torch.runs.read import movements_on_disk, read_run
 from sgimd_torch.spaces import stream
@@ -192,6 +194,7 @@ def rows_of_movements(content):
         ("DELETE FROM demonstrations", 30),
         *((f"UPDATE {table} SET seal = 0 WHERE rowid = 1", 90) for table in ("goals", "evaluations", "errors")),
         ("DELETE FROM regions WHERE rowid = 1", 90),
+        *((f"UPDATE about SET value = '[1]' WHERE name = '{name}'", 90) for name in ("run", "settings", "versions")),
     ],
 )
 def test_what_is_damaged_is_made_again_only_if_the_loss_is_accepted(
@@ -290,3 +293,30 @@ def test_a_full_disk_is_reported_and_the_run_can_go_on(tmp_path, go, benchmark, 
     assert movements_on_disk(directory) < MOVEMENTS
     assert go(tmp_path, "--board", watched, "--resume") == 0
     assert content_of(directory) == reference
+
+
+def test_a_program_that_reads_the_record_all_the_time_stops_no_run(tmp_path, go, reference, monkeypatch, capsys):
+    monkeypatch.setattr(run_module, "COMMIT_EVERY", 0.0)
+    monkeypatch.setattr("sgimd_torch.record._IMPATIENCE", 0.0)
+    path, after, commit = tmp_path / "sgim-d" / "seed-003" / FILE, run_module.Life._after, run_module.Life._settle
+    viewers, last = [], []
+
+    def look(life, episode):
+        after(life, episode)
+        if episode.index == 20:
+            viewers.append(sqlite3.connect(path, isolation_level=None))
+            viewers[0].execute("BEGIN")
+            viewers[0].execute("SELECT * FROM events").fetchall()
+
+    def settle(life):
+        done = commit(life)
+        last.append((life.movements, done))
+        if last[-6:] == [(90, False)] * 6:
+            viewers[0].close()
+        return done
+
+    monkeypatch.setattr(run_module.Life, "_after", look)
+    monkeypatch.setattr(run_module.Life, "_settle", settle)
+    assert go(tmp_path) == 0
+    assert "waiting until no other program reads" in capsys.readouterr().err
+    assert content_of(path.parent) == reference
