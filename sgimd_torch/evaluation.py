@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sgimd_torch.environments.protocol import BatchEnvironment, Environment, execute_many
+from sgimd_torch.environments.protocol import BatchEnvironment, Environment, execute_many, observed
 from sgimd_torch.files import read_npz, write_npz
 from sgimd_torch.parts import Inverse
 from sgimd_torch.spaces import Array, Box, check_count, check_vector, first_entry, stream
@@ -107,8 +107,7 @@ def contexts_of_goals(environment: Environment, n: int) -> Array:
     """``(n, context_dim)``, an observed context for each goal, equal in all evaluations, so comparisons are paired."""
     if environment.contexts.dim == 0:
         return np.zeros((n, 0))
-    drawn = [environment.observe(stream(0, "contexts of evaluation", goal)) for goal in range(n)]
-    return environment.contexts.check("contexts that the environment observes", np.stack(drawn))
+    return np.stack([observed(environment, stream(0, "contexts of evaluation", goal)) for goal in range(n)])
 
 
 def evaluate(

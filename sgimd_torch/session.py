@@ -29,6 +29,7 @@ from sgimd_torch.environments.protocol import (
     Environment,
     SimulationError,
     check_instance,
+    observed,
 )
 from sgimd_torch.learner import Learner
 from sgimd_torch.learner.events import BeforeMovement
@@ -182,7 +183,7 @@ def _observed(learner: Learner, environment: Environment, index: int, place: int
     if context is not None:
         return context
     dim = environment.contexts.dim
-    return _tried("context", dim, environment.observe, stream(seed, "context", index) if dim else _UNUSED)
+    return _tried("context", dim, observed, environment, stream(seed, "context", index) if dim else _UNUSED)
 
 
 def _asked(

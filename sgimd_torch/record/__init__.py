@@ -292,7 +292,7 @@ class Record:
         self._seals = {name: (n, seal) for name, n, seal in self._connection.execute("SELECT * FROM seals")}
         c, p, t = (found["events"].count(f" {name}_") for name in ("context", "theta", "outcome"))
         self.dims: Dims = c, p, t
-        tables = _tables(self.dims)  # there may be more: an index, a view or statistics of a program that has looked at it
+        tables = _tables(self.dims)  # a viewer may have added an index, a view or statistics
         if {name: found.get(name) for name in tables} != tables or self._seals.keys() != layout(self.dims).keys():
             raise RunError(f"its tables are not those of a record; {HINT}")
         self.about = self._whole_about()

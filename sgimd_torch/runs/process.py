@@ -96,8 +96,17 @@ def loading() -> AbstractContextManager[None]:
 @contextmanager
 def _on_signals(handler: Callable[[int, FrameType | None], object]) -> Iterator[None]:
     """A block in which ``handler`` gets SIGINT and SIGTERM. In another thread than the main one nothing changes."""
+    owner = os.getpid()
+
+    def handle(signum: int, frame: FrameType | None) -> None:
+        if os.getpid() == owner:
+            handler(signum, frame)
+        elif signum != signal.SIGINT:  # a forked worker ends; Ctrl-C is for the owner, who waits for its workers
+            signal.signal(signum, signal.SIG_DFL)
+            os.kill(os.getpid(), signum)
+
     heard = SIGNALS if threading.current_thread() is threading.main_thread() else ()
-    before = {signum: signal.signal(signum, handler) for signum in heard}
+    before = {signum: signal.signal(signum, handle) for signum in heard}
     try:
         yield
     finally:

@@ -284,5 +284,4 @@ def test_a_theta_that_is_no_point_of_pi_never_reaches_a_robot(wrong: object, sai
 def test_a_search_that_leaves_pi_is_named() -> None:
     robot = sagg_riac(ARM, 0, search=Jumpy, global_range=(0.0, 0.0), give_up=-1.0)
     with pytest.raises(ValueError, match="theta of the part Jumpy must lie in its box"):
-        for _ in range(9):
-            step(robot)
+        list(map(step, [robot] * 9))

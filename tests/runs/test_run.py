@@ -134,6 +134,25 @@ def test_a_signal_is_heard_and_a_second_one_stops_at_once(capfd):
             signal.raise_signal(signal.SIGINT)
 
 
+POOL = """
+import multiprocessing, os, signal, time
+from sgimd_torch.runs.process import Stopping
+with Stopping():
+    pool = multiprocessing.get_context("fork").Pool(2)
+    pool.map(abs, range(4))
+    for worker in pool._pool:
+        os.kill(worker.pid, signal.SIGINT)  # as Ctrl-C, which reaches the whole group
+    print(pool.map(abs, range(4)))
+    pool.terminate()
+    pool.join()
+"""
+
+
+def test_workers_that_an_environment_forks_can_be_ended_and_leave_ctrl_c_to_the_run():
+    done = subprocess.run([sys.executable, "-c", POOL], env=SCRIPTS, capture_output=True, text=True, timeout=60)
+    assert (done.stdout, done.stderr, done.returncode) == ("[0, 1, 2, 3]\n", "", 0)
+
+
 SCRIPTS = {**os.environ, "PYTHONPATH": str(ROOT)}
 
 
