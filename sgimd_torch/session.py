@@ -252,7 +252,7 @@ def _answer(
         return (None, "again") if learner.was_shown(shown) else (shown, "shown")
     except TimeoutError as error:
         said, reply = f"did not reply in time, so the learner goes on: {error}", "timed out"
-    except Exception as error:  # no failure of a teacher may end the run
+    except (Exception, SystemExit) as error:  # no failure of a teacher may end the run
         said = f"gave no usable demonstration, so the learner goes on: {type(error).__name__}: {error}"
         reply = "failed"
     warnings.warn(f"teacher {name} {said}", RuntimeWarning, stacklevel=4)

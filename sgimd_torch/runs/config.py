@@ -83,7 +83,7 @@ class Config:
         for name in given:
             if name not in self.standards:
                 raise self._refused(name)
-        differing = sorted((name, value) for name, value in given.items() if value != self.standards[name])
+        differing = sorted((name, value) for name, value in given.items() if differ(value, self.standards[name]))
         object.__setattr__(self, "parts", tuple(differing))
         for name, least in (("seed", 0), ("movements", 1), ("repeats", 0), ("failures", 1), ("at_once", 1)):
             value = getattr(self, name)
@@ -301,6 +301,11 @@ def words(config: Config) -> list[str]:
     own = {name: getattr(config, name) for name in RUN}
     own = {name: value for name, value in own.items() if value != RUN[name].default or name == "algorithm"}
     return [f"--{dashed(name)}={typed(value)}" for name, value in {**own, **dict(config.parts)}.items()]
+
+
+def differ(one: Any, other: Any) -> bool:
+    """Whether two values of an option differ; NaN does not differ from NaN."""
+    return bool(one != other and (one == one or other == other))
 
 
 def dashed(name: str) -> str:

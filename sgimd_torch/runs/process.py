@@ -66,7 +66,10 @@ def command(main: Callable[[Sequence[str]], int], argv: Sequence[str] | None = N
         except OSError as error:
             code, why = 2, str(error)  # an error of this library has a complete message
             if error.filename is not None:
-                why = f"{error.filename} cannot be read or written: {error.strerror}"
+                name = str(
+                    error.filename
+                )  # with control characters and lone surrogates, it is shown as Python spells it
+                why = f"{name if name.isprintable() else repr(name)} cannot be read or written: {error.strerror}"
             elif error.errno is not None:
                 code, why = 1, f"not everything could be written: {error.strerror}"
             say(f"error: {why}")
