@@ -122,6 +122,8 @@ def _salvaged(path: Path, damage: str, accept_loss: bool, notes: list[str]) -> R
 def _forget_evaluations(record: Record, config: Config, *, anew: bool, notes: list[str]) -> None:
     """Drop evaluations that are not requested, and all after the first missing one; with ``anew``, drop all."""
     made = list(dict.fromkeys(movements for movements, *_ in record.rows("evaluations")))
+    if not made:  # then the settings may be lost
+        return
     ended = record.about["settings"]["movements"]  # if this run ends later, the noise is not measured here
     longer = config.floor_at is None and ended != config.movements
     kept, left = list[int](), config.evaluations
