@@ -106,10 +106,8 @@ class Life:
     def close(self, *, keep: bool = True) -> None:
         """Close record and listeners; ``keep`` commits the last movements first."""
         try:
-            if keep and not self.replaying and not self._settle():
-                say(f"waiting until no other program reads {self.record.path}, to write the last movements")
-                while not self._settle():
-                    time.sleep(COMMIT_EVERY)
+            if keep:
+                self._keep()
         finally:
             self.record.close()
             for each in self.listeners:
@@ -138,16 +136,14 @@ class Life:
         """Make all movements, or stop after the movement during which ``stopping`` has heard a signal."""
         total, title = self.parts.config.movements, self.parts.config.title
         unit = self.parts.environment.outcomes.amount
+        self.evaluations.between = partial(self._stop_if, stopping)
         with Progress("replaying" if self.recorded else title, self.recorded or total) as progress:
             for _ in self.episodes():
                 last = self.evaluations.last
                 progress.show(self.movements, "" if last is None else f"error {unit(last.mean_error, '.4f')}")
                 if self.movements == self.recorded < total:
                     progress.begin(title, total, self.movements)
-                if stopping.heard and self._all_told:
-                    if not self.replaying:
-                        self.commit()
-                    raise Stopped(stopping.heard)
+                self._stop_if(stopping)
         self.commit()
 
     def episodes(self) -> Iterator[Episode]:
@@ -185,6 +181,19 @@ class Life:
         if self._settle():
             for each in self.listeners:
                 each.flush()
+
+    def _keep(self) -> None:
+        """Write the last movements to the disk, as soon as no other program reads the record."""
+        if not self.replaying and not self._settle():
+            say(f"waiting until no other program reads {self.record.path}, to write the last movements")
+            while not self._settle():
+                time.sleep(COMMIT_EVERY)
+
+    def _stop_if(self, stopping: Stopping) -> None:
+        """Stop between two movements of the run or of an evaluation, if a signal was heard."""
+        if stopping.heard and self._all_told:
+            self._keep()
+            raise Stopped(stopping.heard)
 
     def _curves(self) -> dict[str, float]:
         """Numbers of the listeners for the board since the last call, by tag."""

@@ -55,7 +55,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     n, made = len(goals), f"{len(outcomes)} movements of {len(runs)} run{'s' * (len(runs) > 1)}"
     print(printable(f"{n} goals, on tiles of {tile} reached by {made}: {options.out}"))
     if n < options.tiles / 2:
-        say(f"only {n} goals were made, {options.tiles} were requested; longer runs give more")
+        why = f"tiles smaller than {tile} would be smaller than the finest allowed, or seldom reached twice"
+        say(f"only {n} goals were made, {options.tiles} were requested: {why}; longer runs give more")
     return 0
 
 

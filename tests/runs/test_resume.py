@@ -3,6 +3,7 @@
 import shutil
 import signal
 import sqlite3
+import sys
 
 import numpy as np
 import pytest
@@ -25,7 +26,9 @@ from sgimd_torch.learner.events import Kind
 from sgimd_torch.record import Record
 from sgimd_torch.runs import evaluations
 from sgimd_torch.runs import run as run_module
+from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.directory import FILE
+from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import movements_on_disk, read_run
 from sgimd_torch.spaces import stream
 
@@ -320,3 +323,37 @@ def test_a_program_that_reads_the_record_all_the_time_stops_no_run(tmp_path, go,
     assert go(tmp_path) == 0
     assert "waiting until no other program reads" in capsys.readouterr().err
     assert content_of(path.parent) == reference
+
+
+def test_ctrl_c_during_an_evaluation_stops_after_its_movement_and_the_run_ends_as_if_it_never_was(
+    tmp_path, module, capsys
+):
+    module("plugged", PLUGGED)
+    words = ["--environment", "plugged:Arm", "--algorithm", "random", "--movements", "20", "--evaluate-at", "10", "--repeats", "2"]
+    plugged = [*words, "--benchmark", "null", "--out"]
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setenv("CTRL_C_AT", "15")
+        assert command(main, [*plugged, "stopped"]) == 130
+    assert "stopped after 10 movements; to go on: " in capsys.readouterr().err
+    assert sys.modules["plugged"].Arm.made == 15
+    assert movements_on_disk(tmp_path / "stopped/random/seed-000") == 10
+    assert command(main, [*plugged, "stopped", "--resume"]) == command(main, [*plugged, "whole"]) == 0
+    assert content_of(tmp_path / "stopped/random/seed-000") == content_of(tmp_path / "whole/random/seed-000")
+
+
+PLUGGED = """
+import os, signal
+from sgimd_torch.environments.planar_arm import PlanarArm
+
+class Arm(PlanarArm):
+    made, execute_many = 0, None
+
+    def __init__(self):
+        super().__init__(5)
+
+    def execute(self, context, theta, rng):
+        Arm.made += 1
+        if str(Arm.made) == os.environ.get("CTRL_C_AT"):
+            signal.raise_signal(signal.SIGINT)
+        return super().execute(context, theta, rng)
+"""
