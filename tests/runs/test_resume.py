@@ -329,7 +329,8 @@ def test_ctrl_c_during_an_evaluation_stops_after_its_movement_and_the_run_ends_a
     tmp_path, module, capsys
 ):
     module("plugged", PLUGGED)
-    words = ["--environment", "plugged:Arm", "--algorithm", "random", "--movements", "20", "--evaluate-at", "10", "--repeats", "2"]
+    short = "--environment plugged:Arm --algorithm random --movements 20 --evaluate-at 10 --repeats 2"
+    words = short.split()
     plugged = [*words, "--benchmark", "null", "--out"]
     with pytest.MonkeyPatch.context() as patched:
         patched.setenv("CTRL_C_AT", "15")
