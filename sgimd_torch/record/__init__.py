@@ -172,7 +172,7 @@ class Record:
         """Replace all rows of a table."""
         with self._told(writing=True):
             self._connection.execute(f"DELETE FROM {table}")
-        self._seals[table] = 0, self._first_seal(table)
+        self._seals[table] = 0, self._first_seal(table) or 0
         self._append(table, [plain(row) for row in rows])
 
     def settle(self, **about: Any) -> None:
