@@ -57,6 +57,11 @@ class Evaluations:
         """The last evaluation of the run's own inverse model, None if there is none."""
         return self._found[max(self._found)][OWN] if self._found else None
 
+    @property
+    def made(self) -> int:
+        """Number of evaluations so far, recorded ones included."""
+        return len(self._found)
+
     def after(self, movements: int) -> ByInverse | None:
         """The recorded evaluation after this number of movements, else a new evaluation of the present learner.
 

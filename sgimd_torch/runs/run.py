@@ -136,13 +136,17 @@ class Life:
         """Make all movements, or stop after the movement during which ``stopping`` has heard a signal."""
         total, title = self.parts.config.movements, self.parts.config.title
         unit = self.parts.environment.outcomes.amount
+        before = self.seconds.summary()["seconds_evaluation"]
         self.evaluations.between = partial(self._stop_if, stopping)
         with Progress("replaying" if self.recorded else title, self.recorded or total) as progress:
             for _ in self.episodes():
                 last = self.evaluations.last
-                progress.show(self.movements, "" if last is None else f"error {unit(last.mean_error, '.4f')}")
+                note = "" if last is None else f"error {unit(last.mean_error, '.4f')}"
+                spent = self.seconds.summary()["seconds_evaluation"]
+                progress.show(self.movements, note, spent=spent - before, later=self._later(spent))
                 if self.movements == self.recorded < total:
                     progress.begin(title, total, self.movements)
+                    before = spent
                 self._stop_if(stopping)
         self.commit()
 
@@ -188,6 +192,10 @@ class Life:
             say(f"waiting until no other program reads {self.record.path}, to write the last movements")
             while not self._settle():
                 time.sleep(COMMIT_EVERY)
+
+    def _later(self, spent: float) -> float:
+        """Time (s) that the evaluations to come will take, if each takes as long as the mean of those so far."""
+        return spent / max(self.evaluations.made, 1) * len(self._wanted)
 
     def _stop_if(self, stopping: Stopping) -> None:
         """Stop between two movements of the run or of an evaluation, if a signal was heard."""
