@@ -8,6 +8,7 @@ its movements, and it has random streams of its own.
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,7 +17,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sgimd_torch.environments.protocol import BatchEnvironment, Environment, execute_many
+from sgimd_torch.environments.protocol import BatchEnvironment, Environment, execute_many, observed
 from sgimd_torch.files import read_npz, write_npz
 from sgimd_torch.parts import Inverse
 from sgimd_torch.spaces import Array, Box, check_count, check_vector, first_entry, stream
@@ -107,8 +108,7 @@ def contexts_of_goals(environment: Environment, n: int) -> Array:
     """``(n, context_dim)``, an observed context for each goal, equal in all evaluations, so comparisons are paired."""
     if environment.contexts.dim == 0:
         return np.zeros((n, 0))
-    drawn = [environment.observe(stream(0, "contexts of evaluation", goal)) for goal in range(n)]
-    return environment.contexts.check("contexts that the environment observes", np.stack(drawn))
+    return np.stack([observed(environment, stream(0, "contexts of evaluation", goal)) for goal in range(n)])
 
 
 def evaluate(
@@ -120,6 +120,7 @@ def evaluate(
     *,
     context: ArrayLike | None = None,
     repeats: int = 3,
+    between: Callable[[], object] = bool,
 ) -> Evaluation:
     """Execute the answer to every goal once, and ``repeats`` times more to measure the noise.
 
@@ -135,6 +136,8 @@ def evaluate(
         repeats: number k of repetitions of each movement, 2 or more; 0 to leave the noise unmeasured. The measured
             scatter is multiplied by sqrt(k / (k - 1)), because outcomes lie nearer to their own mean than to the true
             mean; for Gaussian noise the result does not depend on k.
+        between: function to call before each movement, or once if all are executed together; its `KeyboardInterrupt`
+            ends the evaluation.
 
     Raises:
         ValueError: there are no goals, goals have another dimension or are not finite, or a number is out of its range.
@@ -153,7 +156,7 @@ def evaluate(
         contexts = np.broadcast_to(given, (len(goals), environment.contexts.dim))
     thetas = np.stack([estimate.theta for estimate in inverse.answer_many(contexts, goals)])
     copies = np.tile(thetas, (1 + repeats, 1))  # repeats come last, so that errors do not depend on their number
-    landed = _landed(environment, np.tile(contexts, (1 + repeats, 1)), copies, seed, f"evaluation {step}")
+    landed = _landed(environment, np.tile(contexts, (1 + repeats, 1)), copies, seed, f"evaluation {step}", between)
     landed = landed.reshape(1 + repeats, *goals.shape)
     outcomes, again = landed[0], landed[1:]
     failed = np.isnan(outcomes).any(axis=1)
@@ -165,14 +168,18 @@ def evaluate(
     return Evaluation(np.linalg.norm(reached - goals, axis=1), thetas, outcomes, scatter, contexts, failed)
 
 
-def _landed(environment: Environment, contexts: Array, thetas: Array, seed: int, name: str) -> Array:
+def _landed(
+    environment: Environment, contexts: Array, thetas: Array, seed: int, name: str, between: Callable[[], object]
+) -> Array:
     """Outcomes ``(n, outcome_dim)``, NaN for a failed movement; movement i has stream i of this ``name``."""
     rows = range(len(thetas))
     if isinstance(environment, BatchEnvironment):
+        between()
         with suppress(Exception, SystemExit):  # a movement failed; the loop below finds it
             return execute_many(environment, contexts, thetas, [stream(seed, name, row) for row in rows])
     landed = np.full((len(thetas), environment.outcomes.dim), np.nan)
     for row in rows:
+        between()
         with suppress(Exception, SystemExit):  # no failure of a robot may end an evaluation
             landed[row] = execute_many(environment, contexts[[row]], thetas[[row]], [stream(seed, name, row)])[0]
     return landed

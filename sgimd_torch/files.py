@@ -8,7 +8,10 @@ All modules of the library replace files by these functions.
 from __future__ import annotations
 
 import io
+import lzma
+import math
 import os
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,9 +25,31 @@ from numpy.typing import NDArray
 Stored = NDArray[Any]
 
 _UNREADABLE: Final = (
-    *(ValueError, TypeError, AttributeError, OSError, EOFError, RuntimeError),
-    *(zipfile.BadZipFile, zlib.error),
+    *(ValueError, TypeError, AttributeError, OSError, EOFError, RuntimeError, MemoryError, OverflowError),
+    *(SyntaxError, tokenize.TokenError, zipfile.BadZipFile, zlib.error, lzma.LZMAError),
 )
+_LARGE: Final = 2**28  # bytes that any file may take
+_DENSE: Final = 100  # bytes that each byte of a larger file may take
+
+
+def check_regular(path: str | os.PathLike[str]) -> None:
+    """Refuse a named pipe or a device, which might keep its reader waiting for ever.
+
+    Raises:
+        OSError: ``path`` is neither a file nor a folder, though something is there.
+    """
+    if os.path.exists(path) and not os.path.isfile(path) and not os.path.isdir(path):
+        raise OSError(f"{path} is a pipe or a device, not a file")
+
+
+def check_density(n_bytes: int, path: str | os.PathLike[str]) -> None:
+    """Refuse a file before its content takes ``n_bytes`` of memory, if the file is far too small for them.
+
+    Raises:
+        ValueError: the content would take more than 256 MB, and more than 100 times the size of the file.
+    """
+    if n_bytes > max(_LARGE, _DENSE * os.path.getsize(path)):
+        raise ValueError(f"it would take {n_bytes} bytes of memory, far more than the {os.path.getsize(path)} it has")
 
 
 @contextmanager
@@ -84,13 +109,15 @@ def read_npz(path: str | os.PathLike[str], kind: str, writer: str, names: Sequen
     def refused(why: str) -> ValueError:
         return ValueError(f"{path} is no {kind}: {why}; was it written by {writer}, and whole?")
 
+    check_regular(path)
     with open(path, "rb") as file:
         if not zipfile.is_zipfile(file):
             raise refused("it is not an npz file")
         file.seek(0)
         try:
-            with np.load(file, allow_pickle=False) as stored:
-                found = {name: stored[name] for name in names if name in stored}
+            with zipfile.ZipFile(file) as stored:
+                known = set(stored.namelist())
+                found = {name: _array(stored, f"{name}.npy") for name in names if f"{name}.npy" in known}
             for array in found.values():
                 array.flags.writeable = False
         except _UNREADABLE as error:  # numpy's own message advises allow_pickle=True, which is unsafe
@@ -98,6 +125,19 @@ def read_npz(path: str | os.PathLike[str], kind: str, writer: str, names: Sequen
     if missing := [name for name in names if name not in found]:
         raise refused(f"it lacks {', '.join(missing)}")
     return [found[name] for name in names]
+
+
+def _array(stored: zipfile.ZipFile, name: str) -> Stored:
+    """An array of an npz file. Its size is looked at before any memory is taken."""
+    info = stored.getinfo(name)
+    check_density(info.file_size, str(stored.filename))
+    with stored.open(info) as member:
+        head = np.lib.format.read_array_header_1_0 if np.lib.format.read_magic(member) == (1, 0) else None
+        shape, _, kind = (head or np.lib.format.read_array_header_2_0)(member)
+        if math.prod(shape) * kind.itemsize != info.file_size - member.tell():
+            raise ValueError(f"{name} has not as many numbers as it says")
+    with stored.open(info) as member:
+        return np.asarray(np.lib.format.read_array(member, allow_pickle=False))
 
 
 def checksum(path: Path) -> str:

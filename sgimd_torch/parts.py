@@ -222,6 +222,10 @@ class Strategy(Part):
         """Regions of the goal model. Default: none."""
         return ()
 
+    def maker(self, origin: str) -> Part:
+        """The part that proposes movements of this ``origin``, for messages. Default: this strategy."""
+        return self
+
 
 class Social(Part):
     """Social strategy: what a learner does after a demonstration (sections 3.2.3 and 4.2)."""

@@ -29,6 +29,7 @@ from sgimd_torch.environments.protocol import (
     Environment,
     SimulationError,
     check_instance,
+    observed,
 )
 from sgimd_torch.learner import Learner
 from sgimd_torch.learner.events import BeforeMovement
@@ -182,7 +183,7 @@ def _observed(learner: Learner, environment: Environment, index: int, place: int
     if context is not None:
         return context
     dim = environment.contexts.dim
-    return _tried("context", dim, environment.observe, stream(seed, "context", index) if dim else _UNUSED)
+    return _tried("context", dim, observed, environment, stream(seed, "context", index) if dim else _UNUSED)
 
 
 def _asked(
@@ -251,7 +252,7 @@ def _answer(
         return (None, "again") if learner.was_shown(shown) else (shown, "shown")
     except TimeoutError as error:
         said, reply = f"did not reply in time, so the learner goes on: {error}", "timed out"
-    except Exception as error:  # no failure of a teacher may end the run
+    except (Exception, SystemExit) as error:  # no failure of a teacher may end the run
         said = f"gave no usable demonstration, so the learner goes on: {type(error).__name__}: {error}"
         reply = "failed"
     warnings.warn(f"teacher {name} {said}", RuntimeWarning, stacklevel=4)

@@ -15,7 +15,7 @@ import numpy as np
 
 from sgimd_torch.competence import Competence
 from sgimd_torch.explore.anywhere import Anywhere
-from sgimd_torch.parts import Explore, Goals, Judge, Problem, Search, Social, Strategy
+from sgimd_torch.parts import Explore, Goals, Judge, Part, Problem, Search, Social, Strategy
 from sgimd_torch.spaces import Array, Attempt, Demonstration, Move, check_count
 
 
@@ -99,6 +99,10 @@ class GoalBabbling(Strategy):
     def regions(self) -> Sequence[Any]:
         """Regions of the goal model."""
         return self.goals.regions
+
+    def maker(self, origin: str) -> Part:
+        """The explorer for global movements, the search for local ones."""
+        return {"global": self.explore, "local": self.search}.get(origin, self)
 
     def attempt(self, context: Array) -> Attempt:
         """Choose a goal and pursue it."""

@@ -1,12 +1,15 @@
 """Every loader against damaged and impossible files: refused by the name of the file, or read as they were saved."""
 
 import io
+import os
 import zipfile
 
 import numpy as np
 import pytest
 
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
+from sgimd_torch.demonstrations.columns import Columns
+from sgimd_torch.demonstrations.text import read_text
 from sgimd_torch.evaluation import Benchmark, load_benchmark, save_benchmark
 from sgimd_torch.files import read_npz, write_npz
 from sgimd_torch.spaces import Demonstration
@@ -32,6 +35,12 @@ def zipped(**members):
     return buffer.getvalue()
 
 
+def dense(**arrays):
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, **arrays)
+    return buffer.getvalue()
+
+
 def headed(shape, dtype="<f8"):
     """An npy file of 48 bytes that says that it is of this shape."""
     text = f"{{'descr': '{dtype}', 'fortran_order': False, 'shape': {shape}, }}\n".encode()
@@ -50,6 +59,11 @@ FILES = {
     "a negative length": zipped(numbers=headed((-2, -3))),
     "no shape": zipped(numbers=headed("'a'")),
     "objects by the header alone": zipped(numbers=headed((6,), "|O")),
+    "more numbers than memory": zipped(numbers=headed((10**6, 10**6, 10**6))),
+    "more numbers than an integer": zipped(numbers=headed((10**30,))),
+    "a cut header": zipped(numbers=headed("(6,").replace(b"\n" + bytes(48), bytes(48))),
+    "a deep header": zipped(numbers=headed("(" * 5000)),
+    "few bytes that take much memory": dense(numbers=np.zeros(2**25)),
     "a flipped bit": zipped(numbers=npy(np.zeros(99))).replace(bytes(64), bytes(63) + b"\x01", 1),
 }
 
@@ -124,3 +138,12 @@ def test_a_benchmark_that_cannot_be_is_refused_in_few_words(tmp_path, changes, w
     with pytest.raises(ValueError, match=rf"goals\.npz: .*{words}") as raised:
         load_benchmark(path)
     assert len(str(raised.value)) < 400
+
+
+@pytest.mark.parametrize(
+    "load", [load_benchmark, load_demonstrations, lambda path: read_text(path, Columns(("a",), ("x",)))]
+)
+def test_a_named_pipe_is_refused_and_keeps_nobody_waiting(tmp_path, load):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(OSError, match="pipe is a pipe or a device, not a file"):
+        load(tmp_path / "pipe")

@@ -16,7 +16,7 @@ import numpy as np
 
 from sgimd_torch.asking.interest import AUTONOMOUS, StrategicGoals
 from sgimd_torch.goals.regions import Region
-from sgimd_torch.parts import Problem, Social, Strategy
+from sgimd_torch.parts import Part, Problem, Social, Strategy
 from sgimd_torch.spaces import Array, AskingAttempt, Request
 from sgimd_torch.strategies import GoalBabbling, watched
 
@@ -59,6 +59,10 @@ class StrategicBabbling(Strategy):
     def regions(self) -> Sequence[Region]:
         """Regions of the goal model."""
         return self.goals.regions
+
+    def maker(self, origin: str) -> Part:
+        """See `GoalBabbling.maker`."""
+        return self.babbling.maker(origin)
 
     def attempt(self, context: Array) -> AskingAttempt:
         """Movements by one strategy for one goal; if the teacher has no reply, the movements are autonomous.

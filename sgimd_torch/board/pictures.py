@@ -26,7 +26,8 @@ SHARE: Final = 0.15  # error of the last colour, as a share of T's longest side;
 NARROW: Final = 0.2  # share of the width of the map; the name of a narrower region is turned by 90 degrees
 WIDE: Final = 2.5  # width (inches) of the axes of a picture, without the colour bar
 MARGIN: Final = 0.7  # height (inches) of the space above and below the axes together
-STYLE: Any = {"font.size": 10, "axes.titlesize": 10}  # sizes that are readable on the page Time Series
+# Sizes that are readable on the page Time Series; names of a user are no formulas.
+STYLE: Any = {"font.size": 10, "axes.titlesize": 10, "text.parse_math": False}
 
 
 def draw(regions: Sequence[Region], space: Box, goals: Array, errors: Array) -> dict[str, NDArray[np.uint8]]:

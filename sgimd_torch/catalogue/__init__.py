@@ -150,6 +150,9 @@ EXTRAS: Final = {
     **{name: name for name in ("report", "teach", "film")},
 }
 _PACKAGE: Final = Path(__file__).parents[1]
+PLACES: Final = {f"{_PACKAGE.name}.{at}" for words in WORDS.values() for at in words.values()}
+"""Places of the catalogue. All other places are code of a user, even places in this library: from a module of ours,
+dots may lead to any module that it imports."""
 
 
 def place_of(kind: str, word: str) -> str:

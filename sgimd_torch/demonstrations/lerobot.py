@@ -21,6 +21,7 @@ import numpy as np
 
 from sgimd_torch.demonstrations.columns import Columns, Recording, Table, recordings
 from sgimd_torch.demonstrations.text import POINTER
+from sgimd_torch.files import check_density, check_regular
 
 try:
     import pyarrow
@@ -115,11 +116,24 @@ def _info(root: Path) -> dict[str, Any]:
 
 def _columns(file: Path, names: list[str]) -> dict[str, np.ndarray]:
     """Columns of a parquet file by name, as ``(n_rows,)`` values or ``(n_rows, k)`` vectors."""
+    check_regular(file)
     with open(file, "rb") as content:
         if content.read(len(POINTER)) == POINTER.encode():
             raise ValueError(f"{file} is a pointer of Git LFS, not the file itself; git lfs pull gets the file")
     try:
+        about = pyarrow.parquet.read_metadata(file)
+        groups = [about.row_group(k) for k in range(about.num_row_groups)]
+        chunks = [group.column(k) for group in groups for k in range(group.num_columns)]
+        wanted = tuple(f"{name}." for name in names)
+        check_density(sum(8 * c.num_values for c in chunks if f"{c.path_in_schema}.".startswith(wanted)), file)
         table = pyarrow.parquet.read_table(file, columns=names, page_checksum_verification=True)
         return {name: np.array(table.column(name).to_pylist()) for name in names}
-    except (pyarrow.ArrowException, OSError, ValueError, KeyError) as error:  # ValueError: vectors differ in length
+    except (
+        pyarrow.ArrowException,
+        OSError,
+        ValueError,
+        KeyError,
+        MemoryError,
+        OverflowError,
+    ) as error:  # ValueError: vectors differ in length
         raise ValueError(f"{file} cannot be read: {str(error)[:200]}; is it whole, with columns {names}?") from error

@@ -14,6 +14,7 @@ from typing import Final
 import numpy as np
 
 from sgimd_torch.demonstrations.columns import NUMBER, Columns, Recording, Table, recordings
+from sgimd_torch.files import check_regular
 
 SUFFIXES: Final = (".csv", ".tsv", ".txt", ".dat")
 POINTER: Final = "version https://git-lfs"  # the beginning of a file that stands for a large one
@@ -54,6 +55,7 @@ def _table(file: Path, columns: Columns) -> Table:
     Raises:
         ValueError: the file is no table, or has no column that is named.
     """
+    check_regular(file)
     text = file.read_text(encoding="utf-8-sig", errors="replace")
     if text.startswith(POINTER):
         raise ValueError("it is a pointer of Git LFS, not the file itself; git lfs pull gets the file")

@@ -7,6 +7,7 @@ Section 2.1 of Nguyen & Oudeyer (2014): M(c, theta) = tau. An environment of you
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Protocol, runtime_checkable
@@ -176,6 +177,9 @@ FAILURES: Final = 10
 """Number of successive failed movements after which a run ends."""
 
 
+_ROUNDING: Final = 1e-6  # distance from C, relative to its sides, that rounding may explain
+
+
 class SimulationError(RuntimeError):
     """A movement failed and has no usable outcome; if ``theta`` ``(theta_dim,)`` is given, the message names it."""
 
@@ -185,6 +189,23 @@ class SimulationError(RuntimeError):
 
     def __str__(self) -> str:
         return self.reason if self.theta is None else f"{self.reason}; theta={np.asarray(self.theta).tolist()}"
+
+
+def observed(environment: Environment, rng: np.random.Generator) -> Array:
+    """The context ``(context_dim,)`` that the environment observes; one outside C by rounding is clipped, and told.
+
+    Raises:
+        ValueError: it is not one point of C.
+    """
+    box = environment.contexts
+    context = check_point("context", environment.observe(rng), box.dim)
+    if box.contains(context):
+        return context
+    clipped = box.clip(context)
+    if (np.abs(clipped - context) > _ROUNDING * box.sides).any():
+        box.check("context", context)
+    warnings.warn("a context outside C by rounding was clipped; so are later ones", RuntimeWarning, stacklevel=2)
+    return clipped
 
 
 def execute_many(

@@ -18,6 +18,7 @@ from sgimd_torch.files import write_bytes
 DPI: Final = 150
 STYLE: Final[Any] = {
     "font.size": 12,
+    "text.parse_math": False,  # names of a user are no formulas
     "axes.titlesize": 13,
     "axes.spines.top": False,
     "axes.spines.right": False,

@@ -18,7 +18,7 @@ import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 
-from sgimd_torch.files import write_bytes
+from sgimd_torch.files import check_regular, write_bytes
 from sgimd_torch.forward_model.ensemble import Ensemble
 from sgimd_torch.forward_model.training import OnlineTrainer
 from sgimd_torch.memory import Memory
@@ -267,13 +267,23 @@ def load_forward_model(path: str | os.PathLike[str], **options: Any) -> ForwardM
         ValueError: the file is no forward model, or truncated.
         OSError: there is no file, or it may not be read.
     """
+    check_regular(path)
     Path(path).open("rb").close()  # raises the usual error of an unreadable file
     try:
         with safe_open(str(path), framework="pt") as file:
             about = json.loads(file.metadata()["model"])
+            shapes = [tuple(file.get_slice(name).get_shape()) for name in ("input_mean", "outcome_mean", "weights.0")]
+            dims = (about["context_dim"] + about["theta_dim"],), (about["outcome_dim"],)
+            if shapes[:2] != [*dims] or shapes[2][:2] != (about["members"], *dims[0]):
+                raise ValueError("its dimensions are not those of its weights")
+            if {*about} != {"context_dim", "theta_dim", "outcome_dim", "members", "noise_heads"}:
+                raise ValueError("its header has other entries")
             state = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118, it is no dict
-    except (SafetensorError, KeyError, TypeError, ValueError) as error:
+    except (SafetensorError, KeyError, TypeError, ValueError, RecursionError) as error:
         raise ValueError(f"{path} is no forward model: {str(error)[:100]}; was it written by save()?") from error
     model = ForwardModel(**{**options, **about})
-    model.load_state_dict(state)
+    try:
+        model.load_state_dict(state)
+    except RuntimeError as error:
+        raise ValueError(f"{path} is no forward model: its weights have other shapes or names") from error
     return model

@@ -130,7 +130,8 @@ class Learner:
 
         Raises:
             RuntimeError: the outcome of the last movement was not told, or the context changed during an attempt.
-            ValueError: the context has another shape, or is not finite.
+            ValueError: the context has another shape or is not finite, or a part has proposed a theta that is no point
+                of Pi.
         """
         (move,) = self.ask_many([context])
         if move is None:
@@ -149,7 +150,8 @@ class Learner:
 
         Raises:
             RuntimeError: outcomes of the last movements were not told, or a context changed during an attempt.
-            ValueError: there are no contexts, or one has another shape or is not finite.
+            ValueError: there are no contexts, one has another shape or is not finite, or a part has proposed a theta
+                that is no point of Pi.
         """
         if self._asked:
             raise RuntimeError(
@@ -360,8 +362,19 @@ class Learner:
             while place.request is not None:
                 self.go_on_alone("nothing", place=place.number)
             if place.attempt is not None:
-                return place.move
+                return self._within_pi(place.move)
         raise RuntimeError(f"{type(self.autonomous).__name__}.attempt() has to yield at least once")
+
+    def _within_pi(self, move: Move | None) -> Move | None:
+        """The movement, which may go to a robot; a theta that is no point of Pi never does."""
+        if move is None:
+            return move
+        pi, theta = self.problem.policies, move.theta
+        if theta.dtype != pi.low.dtype or theta.shape != pi.low.shape or not pi.contains(theta):  # quicker than check
+            part = self.social if move.origin == "imitate" and self.social else self.autonomous.maker(move.origin)
+            name = f"theta of the part {type(part).__name__}"
+            pi.check(name, check_point(name, theta, pi.dim))
+        return move
 
     def _checked(self, move: Move | Failure | None, outcome: ArrayLike | Failure | None) -> Array | Failure | None:
         """What came of a movement; a rest without anything is None."""

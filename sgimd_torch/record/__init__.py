@@ -29,7 +29,7 @@ from pathlib import Path
 from typing import Any, Final, Self
 
 from sgimd_torch.files import replacing
-from sgimd_torch.learner.events import Event
+from sgimd_torch.learner.events import Event, Kind
 from sgimd_torch.record.layout import (
     DERIVED,
     HINT,
@@ -50,23 +50,26 @@ from sgimd_torch.spaces import Demonstration
 
 __all__ = ["DERIVED", "Dims", "Record", "ReplayError", "RunError", "layout"]
 
-_PATIENCE: Final = 60.0  # s, longest time that a commit waits for readers
+_PATIENCE: Final = 60.0  # s, longest time that a commit waits for readers of other programs
+_IMPATIENCE: Final = 0.1  # s, the same for a commit that can be made later
 _AT_ONCE: Final = 4096  # number of rows that one query reads
 
 
 class Record:
     """An existing record, open for reading and, on request, for writing; a context manager.
 
+    A reader copies the file into its memory at once. So it keeps no lock, and sees one state of the file.
+
     Args:
         path: SQLite file.
         write: whether to open the file for writing, too. Other processes can then only read it, until ``close``.
 
     Attributes:
-        about: settings, versions and other facts about the run, by name; see ``settle``.
+        about: settings, versions and other facts about the run, by name, without damaged ones; see ``settle``.
         dims: dimensions of context, theta and outcome.
 
     Raises:
-        RunError: there is no record at ``path``, its header is damaged, or another process is writing it.
+        RunError: there is no record at ``path``, its tables are damaged, or another process is writing it.
     """
 
     def __init__(self, path: str | os.PathLike[str], *, write: bool = False) -> None:
@@ -79,7 +82,7 @@ class Record:
         self._connection = _connect(self.path, write)
         try:
             with self._told():
-                self._lock() if write else self._connection.execute("BEGIN")  # a reader sees one state of the file
+                self._lock() if write else self._copy()
                 self._open()
         except BaseException:
             self._connection.close()
@@ -129,18 +132,18 @@ class Record:
             RunError: a row was changed, or rows are missing or added; all rows before it have been yielded.
         """
         n, seal, last = 0, self._first_seal(table), -(2**63)
-        # No cursor stays open between yields, because an open cursor locks the file, even after an error.
+        # No cursor stays open between yields, because a writer cannot commit while one is open.
         next_rows = f"SELECT rowid, * FROM {table} WHERE rowid > ? ORDER BY rowid LIMIT {_AT_ONCE}"
         with self._told():
             while rows := self._connection.execute(next_rows, (last,)).fetchall():
                 last = rows[-1][0]
                 for _, *row, found in rows:
-                    seal = zlib.crc32(_row_bytes(row), seal)
+                    seal = found if seal is None else zlib.crc32(_row_bytes(row), seal)
                     if seal != found:
                         raise RunError(f"{self.path}: row {n + 1} of {table} is not what was written; {HINT}")
                     n += 1
                     yield tuple(row)
-        if (n, seal) != self._seals[table]:
+        if n != self._seals[table][0] or seal not in (None, self._seals[table][1]):
             raise RunError(f"{self.path}: {table} has {n} rows, {self._seals[table][0]} were written; {HINT}")
 
     def events(self) -> Iterator[Event]:
@@ -169,7 +172,7 @@ class Record:
         """Replace all rows of a table."""
         with self._told(writing=True):
             self._connection.execute(f"DELETE FROM {table}")
-        self._seals[table] = 0, self._first_seal(table)
+        self._seals[table] = 0, self._first_seal(table) or 0
         self._append(table, [plain(row) for row in rows])
 
     def settle(self, **about: Any) -> None:
@@ -177,18 +180,32 @@ class Record:
         self.about |= about
         self.replace_rows("about", _about_rows(self.about))
 
-    def commit(self) -> None:
+    def commit(self, *, wait: bool = True) -> bool:
         """Bring all new rows to the disk, or none of them.
+
+        Args:
+            wait: whether to wait for other programs that are reading the file. If False, the rows stay for the next
+                commit while a program is reading.
+
+        Returns:
+            Whether the rows are on the disk.
 
         Raises:
             OSError: the disk is full or cannot be written; earlier commits remain.
-            RunError: another process has written in the meantime.
+            RunError: another process has written in the meantime, or has read for too long.
         """
         seals = [(n, seal, table) for table, (n, seal) in self._seals.items()]
         with self._told(writing=True):
+            self._connection.execute(f"PRAGMA busy_timeout = {int(1000 * (_PATIENCE if wait else _IMPATIENCE))}")
             self._connection.executemany("UPDATE seals SET n_rows = ?, seal = ? WHERE name = ?", seals)
-            self._connection.execute("COMMIT")
+            try:
+                self._connection.execute("COMMIT")
+            except sqlite3.OperationalError as error:
+                if wait or error.sqlite_errorcode != sqlite3.SQLITE_BUSY:
+                    raise
+                return False
             self._lock()
+        return True
 
     def check(self) -> dict[str, str]:
         """Error messages about damaged tables, by name of the table; {} if no table is damaged."""
@@ -218,8 +235,13 @@ class Record:
                     for row in self.rows("demonstrations"):
                         shown.append(read_demonstration(row, self.dims))
                 with suppress(RunError, IndexError):  # IndexError: an event refers to a lost demonstration
+                    asked: list[Event] = []  # a request is kept with the demonstration that follows, or not at all
                     for event in map(event_reader(self.dims, shown), self.rows("events")):
-                        new.add(event)
+                        asked.append(event)
+                        if event.kind != Kind.ASKED or event.reply != "shown":
+                            for each in asked:
+                                new.add(each)
+                            asked.clear()
                 new.commit()
             self.close()
         return Record(self.path, write=True)
@@ -244,20 +266,48 @@ class Record:
                 self._connection.executemany(f"INSERT INTO {table} VALUES ({marks})", new)
             self._seals[table] = n + len(new), new[-1][-1]
 
-    def _first_seal(self, table: str) -> int:
-        return _root("" if table == "about" else self.about["run"], table)
+    def _first_seal(self, table: str) -> int | None:
+        """The seal before the first row; None if the number of the run is lost, so the first row is believed."""
+        if table == "about":
+            return _root("", table)
+        return _root(self.about["run"], table) if "run" in self.about else None
+
+    def _copy(self) -> None:
+        """Read from a copy in memory from now on."""
+        copy = sqlite3.connect(":memory:", isolation_level=None, check_same_thread=False)
+        try:
+            self._connection.execute("BEGIN")
+            self._connection.execute("SELECT * FROM sqlite_schema").fetchall()  # locks, within the time limit
+            self._connection.backup(copy)
+        except BaseException:
+            copy.close()
+            raise
+        self._connection.close()
+        self._connection = copy
 
     def _open(self) -> None:
         found = dict(self._connection.execute("SELECT name, sql FROM sqlite_schema").fetchall())
         if not found:
             raise RunError("it is still empty")
         self._seals = {name: (n, seal) for name, n, seal in self._connection.execute("SELECT * FROM seals")}
-        self.about: dict[str, Any] = {name: json.loads(value) for name, value in self.rows("about")}
-        self.dims: Dims = tuple(self.about["dims"])
-        if found != _tables(self.dims) or self._seals.keys() != layout(self.dims).keys():
+        c, p, t = (found["events"].count(f" {name}_") for name in ("context", "theta", "outcome"))
+        self.dims: Dims = c, p, t
+        tables = _tables(self.dims)  # a viewer may have added an index, a view or statistics
+        if {name: found.get(name) for name in tables} != tables or self._seals.keys() != layout(self.dims).keys():
             raise RunError(f"its tables are not those of a record; {HINT}")
+        self.about = self._whole_about()
         last = self._connection.execute("SELECT movement, kind FROM events ORDER BY rowid DESC LIMIT 1").fetchone()
         self._movements = 0 if last is None else movements_after(*last)
+
+    def _whole_about(self) -> dict[str, Any]:
+        """The entries of ``about`` that are as they were written."""
+        about, before = dict[str, Any](), _root("", "about")
+        with suppress(sqlite3.DatabaseError, TypeError):  # a page of the table is damaged, or a seal is no number
+            for name, value, seal in self._connection.execute("SELECT * FROM about ORDER BY rowid"):
+                if zlib.crc32(_row_bytes((name, value)), before) == seal:
+                    about[name] = json.loads(value)
+                before = seal
+        return about
 
     def _lock(self) -> None:
         """Lock the file against other writers until this record is closed; readers are still admitted."""
@@ -266,7 +316,6 @@ class Record:
         self._version = self._connection.execute("PRAGMA data_version").fetchone()
         if before not in (None, self._version):
             raise RunError("another process has written to it")
-        self._connection.execute(f"PRAGMA busy_timeout = {int(1000 * _PATIENCE)}")
 
     @contextmanager
     def _told(self, *, writing: bool = False) -> Iterator[None]:

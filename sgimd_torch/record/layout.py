@@ -69,8 +69,8 @@ def event_row(event: Event, movement: int, lesson: int | None, dims: Dims) -> Ro
         *_cells(event.goal, t),
         *_cells(event.outcome, t),
     )
-    told = lesson, event.who, event.strategy, event.reply, event.place
-    return movement, str(event.kind), event.origin, *vectors, *told
+    origin, who, strategy, reply = (_text(each) for each in (event.origin, event.who, event.strategy, event.reply))
+    return movement, str(event.kind), origin, *vectors, lesson, who, strategy, reply, event.place
 
 
 def event_reader(dims: Dims, shown: Sequence[Demonstration]) -> Callable[[Row], Event]:
@@ -115,9 +115,18 @@ def _vector(name: str, dim: int) -> list[str]:
     return [f"{name}_{k} REAL" for k in range(dim)]
 
 
+def _text(value: str | None) -> str | None:
+    """A text of Python; numpy's and other texts come back from SQLite as such."""
+    if not isinstance(value, str | None):
+        raise ValueError(f"a record keeps origins, names and replies as text, got {value!r}")
+    return None if value is None else str(value)
+
+
 def _cells(values: Array | None, dim: int) -> list[Any]:
     """The cells of a vector, all NULL if the vector is None or has a NaN. -0.0 becomes 0.0, as in SQLite."""
     numbers = None if values is None else np.asarray(values, dtype=np.float64) + 0.0
+    if numbers is not None and numbers.shape != (dim,):
+        raise ValueError(f"a record keeps vectors of {dim} numbers here, got shape {numbers.shape}; is it a goal?")
     return [None] * dim if numbers is None or np.isnan(numbers).any() else numbers.tolist()
 
 

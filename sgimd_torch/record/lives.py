@@ -54,8 +54,9 @@ def load_life(
         raise RuntimeError("load_life() needs a learner freshly built; this one has lived already")
     dims = learner.problem.dims
     with Record(path) as record:
-        for damage in record.check().values():
-            raise RunError(damage)
+        damage = record.check()
+        for table in damage.keys() & {"events", "demonstrations"}:
+            raise RunError(damage[table])
         if record.dims != dims:
             raise RunError(f"{path} has dims {record.dims} of context, theta, outcome, not {dims}; another robot?")
         begun, exemplars = record.about.get("begun", 0), record.about.get("exemplars")

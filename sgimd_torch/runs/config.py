@@ -16,7 +16,7 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, Final, NamedTuple, Self
 
-from sgimd_torch.catalogue import ROD, TAUGHT_BY, did_you_mean, load_word, place_of, word_of
+from sgimd_torch.catalogue import PLACES, ROD, TAUGHT_BY, did_you_mean, load_word, place_of, word_of
 from sgimd_torch.catalogue.options import Option, choices_of, options_of
 
 OWN: Final = "own"  # name of the run's own inverse model
@@ -83,7 +83,7 @@ class Config:
         for name in given:
             if name not in self.standards:
                 raise self._refused(name)
-        differing = sorted((name, value) for name, value in given.items() if value != self.standards[name])
+        differing = sorted((name, value) for name, value in given.items() if differ(value, self.standards[name]))
         object.__setattr__(self, "parts", tuple(differing))
         for name, least in (("seed", 0), ("movements", 1), ("repeats", 0), ("failures", 1), ("at_once", 1)):
             value = getattr(self, name)
@@ -293,7 +293,7 @@ def code_of(settings: Mapping[str, Any]) -> list[str]:
     """Places ``package.module:attribute`` in ``settings`` that are a user's own code."""
     values = [value for name, value in settings.items() if name not in (*PLACE, *FILES)]
     words = [word for value in values for word in (value if isinstance(value, list) else [value])]
-    return sorted({w for w in words if isinstance(w, str) and ":" in w and not w.startswith("sgimd_torch.")})
+    return sorted({w for w in words if isinstance(w, str) and ":" in w and w not in PLACES})
 
 
 def words(config: Config) -> list[str]:
@@ -301,6 +301,11 @@ def words(config: Config) -> list[str]:
     own = {name: getattr(config, name) for name in RUN}
     own = {name: value for name, value in own.items() if value != RUN[name].default or name == "algorithm"}
     return [f"--{dashed(name)}={typed(value)}" for name, value in {**own, **dict(config.parts)}.items()]
+
+
+def differ(one: Any, other: Any) -> bool:
+    """Whether two values of an option differ; NaN does not differ from NaN."""
+    return bool(one != other and (one == one or other == other))
 
 
 def dashed(name: str) -> str:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import importlib.util
+import os
 import platform
 import shutil
 import subprocess
@@ -19,9 +20,10 @@ import sgimd_torch
 from sgimd_torch.files import checksum, make_folder
 from sgimd_torch.record import Dims, Record, RunError
 from sgimd_torch.runs.build import RunParts
-from sgimd_torch.runs.config import EVALUATES, MAY_CHANGE, Config, code_of, words
+from sgimd_torch.runs.config import EVALUATES, MAY_CHANGE, Config, code_of, differ, words
 
 FILE: Final = "run.sqlite"
+LONGEST: Final = 504  # bytes, longest path of a file that SQLite opens
 LIBRARIES: Final = ("numpy", "scipy", "faiss-cpu", "mujoco")
 FORWARD: Final = ("torch", "lightning", "safetensors")  # libraries of a forward model
 EVALUATED: Final = ("evaluations", "errors", "regions")  # tables that each evaluation adds to
@@ -53,6 +55,10 @@ def open_run(parts: RunParts, *, resume: bool, accept_loss: bool = False) -> tup
         "spaces": {n: [b.low.tolist(), b.high.tolist(), b.names, b.unit] for n, b in spaces.items()},
     }
     dims = robot.contexts.dim, robot.policies.dim, robot.outcomes.dim
+    if len(os.fsencode(path.resolve())) > LONGEST:
+        raise ValueError(
+            f"the path {str(path)[:100]}... has more than {LONGEST} bytes; choose a shorter --out or --name"
+        )
     make_folder(config.directory)
     if not holds_run(path):
         if resume:
@@ -80,16 +86,18 @@ def _reopened(
     """
     record = Record(path, write=True)
     try:
-        differ = _refuse_other(record, about, dims)
-        if damage := record.check():
+        damage = record.check()
+        others = _refuse_other(record, about, dims, lost="about" in damage)
+        if damage:
             record.close()  # copying an open record would release its lock
             record = _salvaged(path, "; ".join(damage.values()), accept_loss, notes)
         if record.movements > config.movements:
             raise RunError(f"{path} has {record.movements} movements already, {config.movements} were requested")
-        _forget_evaluations(record, config, anew=bool(differ & {*EVALUATES}), notes=notes)
+        _forget_evaluations(record, config, anew=bool(others & {*EVALUATES}), notes=notes)
         for table in OF_MODEL:
             record.replace_rows(table, ())
-        about["versions"] = _with_earlier(record.about["versions"], about["versions"], notes)
+        if "versions" in record.about:
+            about["versions"] = _with_earlier(record.about["versions"], about["versions"], notes)
         record.settle(**about)
     except BaseException:
         record.close()
@@ -114,6 +122,8 @@ def _salvaged(path: Path, damage: str, accept_loss: bool, notes: list[str]) -> R
 def _forget_evaluations(record: Record, config: Config, *, anew: bool, notes: list[str]) -> None:
     """Drop evaluations that are not requested, and all after the first missing one; with ``anew``, drop all."""
     made = list(dict.fromkeys(movements for movements, *_ in record.rows("evaluations")))
+    if not made:  # then the settings may be lost
+        return
     ended = record.about["settings"]["movements"]  # if this run ends later, the noise is not measured here
     longer = config.floor_at is None and ended != config.movements
     kept, left = list[int](), config.evaluations
@@ -130,13 +140,17 @@ def _forget_evaluations(record: Record, config: Config, *, anew: bool, notes: li
             record.replace_rows(table, [row for row in record.rows(table) if row[0] in kept])
 
 
-def _refuse_other(record: Record, about: dict[str, Any], dims: Dims) -> set[str]:
-    """Refuse a record of another run; return the names of the settings that differ and are allowed to differ."""
-    if "settings" not in record.about:
+def _refuse_other(record: Record, about: dict[str, Any], dims: Dims, *, lost: bool) -> set[str]:
+    """Refuse a record of another run; return the names of the settings that differ and are allowed to differ.
+
+    If its settings are ``lost``, the replay finds out whether it is another run.
+    """
+    if "settings" not in record.about and not lost:
         raise RunError(f"{record.path} is a life that save_life wrote, not a run; choose another --out")
-    before, now = ({**each["settings"], **each["files"]} for each in (record.about, about))
-    differ = [name for name in dict.fromkeys((*now, *before)) if before.get(name) != now.get(name)]
-    if changed := [name for name in differ if name not in MAY_CHANGE]:
+    known = about.keys() & record.about.keys() & {"settings", "files"}
+    before, now = ({name: v for k in known for name, v in each[k].items()} for each in (record.about, about))
+    others = [name for name in dict.fromkeys((*now, *before)) if differ(before.get(name), now.get(name))]
+    if changed := [name for name in others if name not in MAY_CHANGE]:
         raise RunError(
             f"{record.path.parent} belongs to another configuration: "
             f"{'; '.join(f'{name} was {before.get(name)}, now {now.get(name)}' for name in changed)}. "
@@ -145,7 +159,7 @@ def _refuse_other(record: Record, about: dict[str, Any], dims: Dims) -> set[str]
     if record.dims != dims:
         was = f"dims {record.dims} of context, theta and outcome, the robot now has {dims}"
         raise RunError(f"{record.path} was recorded with {was}; is this another robot?")
-    return {*differ}
+    return {*others}
 
 
 def _with_earlier(old: dict[str, Any], now: dict[str, Any], notes: list[str]) -> dict[str, Any]:

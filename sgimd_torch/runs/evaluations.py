@@ -6,7 +6,7 @@ evaluations.after(500)["own"].mean_error
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -32,6 +32,7 @@ class Evaluations:
         config, environment, benchmark, learner: parts of the run.
         inverses: inverse models to evaluate, by name, the run's own first; all of them read the learner's memory.
         record: record of the run; movements of an evaluation are not recorded.
+        between: function to call before each movement of an evaluation; it may raise `KeyboardInterrupt`.
     """
 
     config: Config
@@ -40,6 +41,7 @@ class Evaluations:
     learner: Learner
     inverses: Mapping[str, Inverse]
     record: Record
+    between: Callable[[], object] = bool
 
     def __post_init__(self) -> None:
         rows: dict[int, dict[str, list[Any]]] = {}
@@ -54,6 +56,11 @@ class Evaluations:
     def last(self) -> Evaluation | None:
         """The last evaluation of the run's own inverse model, None if there is none."""
         return self._found[max(self._found)][OWN] if self._found else None
+
+    @property
+    def made(self) -> int:
+        """Number of evaluations so far, recorded ones included."""
+        return len(self._found)
 
     def after(self, movements: int) -> ByInverse | None:
         """The recorded evaluation after this number of movements, else a new evaluation of the present learner.
@@ -73,10 +80,11 @@ class Evaluations:
         config, (own, *others) = self.config, self.inverses
         repeats = config.repeats if config.due(movements, config.floors) else 0
         judged: tuple[Any, ...] = self.environment, self.benchmark.goals, config.seed, movements
-        found = {own: evaluate(self.inverses[own], *judged, repeats=repeats)}
+        how: dict[str, Any] = {"between": self.between}
+        found = {own: evaluate(self.inverses[own], *judged, repeats=repeats, **how)}
         for word in others:
             same = self.inverses[word] is self.inverses[own]
-            found[word] = found[own].without_noise if same else evaluate(self.inverses[word], *judged, repeats=0)
+            found[word] = found[own].without_noise if same else evaluate(self.inverses[word], *judged, repeats=0, **how)
         return found
 
     def _write(self, movements: int, found: ByInverse) -> None:

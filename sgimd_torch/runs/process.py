@@ -66,7 +66,10 @@ def command(main: Callable[[Sequence[str]], int], argv: Sequence[str] | None = N
         except OSError as error:
             code, why = 2, str(error)  # an error of this library has a complete message
             if error.filename is not None:
-                why = f"{error.filename} cannot be read or written: {error.strerror}"
+                name = str(
+                    error.filename
+                )  # with control characters and lone surrogates, it is shown as Python spells it
+                why = f"{name if name.isprintable() else repr(name)} cannot be read or written: {error.strerror}"
             elif error.errno is not None:
                 code, why = 1, f"not everything could be written: {error.strerror}"
             say(f"error: {why}")
@@ -96,8 +99,17 @@ def loading() -> AbstractContextManager[None]:
 @contextmanager
 def _on_signals(handler: Callable[[int, FrameType | None], object]) -> Iterator[None]:
     """A block in which ``handler`` gets SIGINT and SIGTERM. In another thread than the main one nothing changes."""
+    owner = os.getpid()
+
+    def handle(signum: int, frame: FrameType | None) -> None:
+        if os.getpid() == owner:
+            handler(signum, frame)
+        elif signum != signal.SIGINT:  # a forked worker ends; Ctrl-C is for the owner, who waits for its workers
+            signal.signal(signum, signal.SIG_DFL)
+            os.kill(os.getpid(), signum)
+
     heard = SIGNALS if threading.current_thread() is threading.main_thread() else ()
-    before = {signum: signal.signal(signum, handler) for signum in heard}
+    before = {signum: signal.signal(signum, handle) for signum in heard}
     try:
         yield
     finally:
@@ -173,17 +185,27 @@ class Progress:
         self._bar = tqdm(desc=title, initial=done, total=total, **form)
         self._begun = self._reported = time.monotonic()
 
-    def show(self, done: int, note: str = "") -> None:
-        """Show that ``done`` movements are made, earlier ones included."""
+    def show(self, done: int, note: str = "", *, spent: float = 0.0, later: float = 0.0) -> None:
+        """Show that ``done`` movements are made, earlier ones included.
+
+        Args:
+            done: number of movements.
+            note: text beside the bar.
+            spent: time (s) since `begin` that was spent on other things than movements, such as evaluations.
+            later: time (s) that such things will take.
+        """
+        now = time.monotonic()
+        rate = (done - self._first) / max(now - self._begun - spent, 1e-9)
+        left = self._bar.format_interval((self.total - done) / rate + later) if rate else "?"
+        self._bar.bar_format = (
+            f"{{l_bar}}{{bar}}| {{n_fmt}}/{{total_fmt}} [{{elapsed}}<{left}, {{rate_fmt}}{{postfix}}]"
+        )
         self._bar.total = self.total
         self._bar.set_postfix_str(note, refresh=False)
         self._bar.update(done - self._bar.n)
-        now = time.monotonic()
         if not self._bar.disable or now - self._reported < REPORT_EVERY or done <= self._first:
             return
         self._reported = now
-        rate = (done - self._first) / (now - self._begun)
-        left = self._bar.format_interval((self.total - done) / rate)
         parts = [f"{done} of {self.total} movements", f"{rate:.3g}/s", f"{left} left", note]
         say(f"{self._title}: {', '.join(filter(None, parts))}")
 

@@ -5,6 +5,7 @@ run = read_run("runs/sgim-d/seed-003"); run.outcomes, run.evaluation["mean_error
 
 from __future__ import annotations
 
+import json
 import os
 import re
 from array import array
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 from sgimd_torch.files import checksum
 from sgimd_torch.learner.events import Kind
 from sgimd_torch.record import DERIVED, Record, RunError, layout
-from sgimd_torch.runs.config import FILES, OWN, PLACE, Config, code_of
+from sgimd_torch.runs.config import FILES, OWN, PLACE, Config, code_of, differ
 from sgimd_torch.runs.directory import FILE
 from sgimd_torch.spaces import Array, Box, Demonstration
 
@@ -118,7 +119,7 @@ def read_run(path: str | os.PathLike[str]) -> Run:
     if not (path / FILE).exists():
         raise RunError(f"{path} holds no run; runs are in OUT/NAME/seed-000 and have a file {FILE}")
     with Record(path / FILE) as record:
-        about = record.about
+        about = {name: json.loads(value) for name, value in record.rows("about")}
         if "settings" not in about:
             raise RunError(f"{path / FILE} is a life that save_life wrote, not a run")
         settings = about["settings"]
@@ -237,8 +238,9 @@ def finished(config: Config) -> bool:
     try:
         run = read_run(config.directory)
         found, wanted = run.config, config.settings
-        same = all(found.get(name) == wanted.get(name) for name in found.keys() | wanted.keys() if name not in PLACE)
-        return bool(run.summary["finished"] and same) and all(
+        names = (found.keys() | wanted.keys()) - {*PLACE}
+        others = any(differ(found.get(name), wanted.get(name)) for name in names)
+        return bool(run.summary["finished"] and not others) and all(
             config[name] is None or run.files.get(f"{name}_crc32") in (None, checksum(config[name])) for name in FILES
         )
     except (ValueError, OSError):  # another version, or unreadable; --resume will give the reason

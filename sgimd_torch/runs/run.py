@@ -106,8 +106,8 @@ class Life:
     def close(self, *, keep: bool = True) -> None:
         """Close record and listeners; ``keep`` commits the last movements first."""
         try:
-            if keep and not self.replaying:
-                self._settle()
+            if keep:
+                self._keep()
         finally:
             self.record.close()
             for each in self.listeners:
@@ -136,16 +136,18 @@ class Life:
         """Make all movements, or stop after the movement during which ``stopping`` has heard a signal."""
         total, title = self.parts.config.movements, self.parts.config.title
         unit = self.parts.environment.outcomes.amount
+        before = self.seconds.summary()["seconds_evaluation"]
+        self.evaluations.between = partial(self._stop_if, stopping)
         with Progress("replaying" if self.recorded else title, self.recorded or total) as progress:
             for _ in self.episodes():
                 last = self.evaluations.last
-                progress.show(self.movements, "" if last is None else f"error {unit(last.mean_error, '.4f')}")
+                note = "" if last is None else f"error {unit(last.mean_error, '.4f')}"
+                spent = self.seconds.summary()["seconds_evaluation"]
+                progress.show(self.movements, note, spent=spent - before, later=self._later(spent))
                 if self.movements == self.recorded < total:
                     progress.begin(title, total, self.movements)
-                if stopping.heard and self._all_told:
-                    if not self.replaying:
-                        self.commit()
-                    raise Stopped(stopping.heard)
+                    before = spent
+                self._stop_if(stopping)
         self.commit()
 
     def episodes(self) -> Iterator[Episode]:
@@ -178,19 +180,36 @@ class Life:
         return self.movements == self.parts.learner.movements
 
     def commit(self) -> None:
-        """Write everything to the disk."""
-        self._settle()
-        for each in self.listeners:
-            each.flush()
+        """Write everything to the disk, unless another program is reading the record: then later."""
         self._committed = time.monotonic()
+        if self._settle():
+            for each in self.listeners:
+                each.flush()
+
+    def _keep(self) -> None:
+        """Write the last movements to the disk, as soon as no other program reads the record."""
+        if not self.replaying and not self._settle():
+            say(f"waiting until no other program reads {self.record.path}, to write the last movements")
+            while not self._settle():
+                time.sleep(COMMIT_EVERY)
+
+    def _later(self, spent: float) -> float:
+        """Time (s) that the evaluations to come will take, if each takes as long as the mean of those so far."""
+        return spent / max(self.evaluations.made, 1) * len(self._wanted)
+
+    def _stop_if(self, stopping: Stopping) -> None:
+        """Stop between two movements of the run or of an evaluation, if a signal was heard."""
+        if stopping.heard and self._all_told:
+            self._keep()
+            raise Stopped(stopping.heard)
 
     def _curves(self) -> dict[str, float]:
         """Numbers of the listeners for the board since the last call, by tag."""
         return {tag: value for each in self.listeners for tag, value in each.curves().items()}
 
-    def _settle(self) -> None:
+    def _settle(self) -> bool:
         self.record.settle(seconds=self.seconds.summary())
-        self.record.commit()
+        return self.record.commit(wait=False)
 
     def _after(self, episode: Episode) -> None:
         replayed = self.replaying

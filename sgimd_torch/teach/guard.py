@@ -11,11 +11,12 @@ import hmac
 import http
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from http.cookies import SimpleCookie
+from http.cookies import CookieError, SimpleCookie
 from typing import Any, Final
 from urllib.parse import parse_qs, urlsplit
 
 import websockets.asyncio.server
+from websockets.datastructures import MultipleValuesError
 from websockets.http11 import Request, Response
 
 Process = Callable[[Any, Request], Response | None]
@@ -56,11 +57,15 @@ def guard(token: str, process: Process) -> Process:
 
         if len(request.path) > LONGEST:
             return refused(http.HTTPStatus.REQUEST_URI_TOO_LONG)
-        host, origin = request.headers.get("Host", ""), request.headers.get("Origin")
-        if urlsplit(f"//{host}").hostname not in OWN or origin not in (None, f"http://{host}"):
+        try:
+            host, origin, cookies = (request.headers.get(each) for each in ("Host", "Origin", "Cookie"))
+            own = urlsplit(f"//{host}").hostname in OWN and origin in (None, f"http://{host}")
+            typed = parse_qs(urlsplit(request.path).query).get("token", [""])[0]
+            cookie = SimpleCookie(cookies).get(name)
+        except (ValueError, CookieError, MultipleValuesError):  # no browser sends such headers
+            own = False
+        if not own:
             return refused(http.HTTPStatus.FORBIDDEN)
-        typed = parse_qs(urlsplit(request.path).query).get("token", [""])[0]
-        cookie = SimpleCookie(request.headers.get("Cookie", "")).get(name)
         shown = typed or ("" if cookie is None else cookie.value)
         if not hmac.compare_digest(shown.encode(), token.encode()):
             return refused(http.HTTPStatus.FORBIDDEN)

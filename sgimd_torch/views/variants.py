@@ -6,6 +6,7 @@ chosen = baseline_of(variants, "random"); [(row.variant.label, row.verdict) for 
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
@@ -18,6 +19,8 @@ from tqdm import tqdm
 
 from sgimd_torch.catalogue import unknown
 from sgimd_torch.figures.names import label
+from sgimd_torch.runs.directory import FILE
+from sgimd_torch.runs.process import say
 from sgimd_torch.runs.read import Run, find_runs, read_run
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.statistics import LEAST_SEEDS, Interval, common_differences, over_seeds
@@ -27,13 +30,16 @@ USUAL: Final = "sgim-d"  # name of the default baseline
 
 
 def read(place: Path) -> dict[str, list[Run]]:
-    """All runs below a folder, by name of the variant, without their thetas.
+    """All runs below a folder, by name of the variant, without their thetas; folders without a run are named.
 
     Raises:
         RunError: there are no runs, or one is damaged.
     """
     runs: dict[str, list[Run]] = {}
     found = [(name, path) for name, paths in find_runs(place).items() for path in paths]
+    for folder in sorted([*place.glob("seed-*/"), *place.glob("*/seed-*/")]):
+        if not os.path.isfile(folder / FILE):
+            say(f"left out: {folder} has no {FILE} that can be read")
     for name, path in tqdm(found, "reading", unit="", delay=1.0, disable=None):
         run = replace(read_run(path), thetas=np.empty((0, 0)))  # thetas need much memory, and no view shows them
         runs.setdefault(name, []).append(run)

@@ -1,5 +1,6 @@
 """Learners that ask: when, whom and what for; teachers that answer, badly too; a life that asked is lived again."""
 
+import sys
 from collections import Counter
 
 import numpy as np
@@ -146,6 +147,7 @@ def fails(context, goal, memory):
 
 BAD = {
     "raises": (fails, "OSError: the camera is off"),
+    "exits": (lambda *_: sys.exit(0), "SystemExit: 0"),
     "outside T": (lambda *_: demonstration(outcome=[9.0, 0.0]), "outcome of the demonstration must lie in its box"),
     "another context": (lambda *_: demonstration(context=[0.5]), "context of the demonstration must have shape"),
     "another shape": (lambda *_: demonstration(outcome=[0.1, 0.2, 0.3]), r"must have shape \(..., 2\), got \(3,\)"),

@@ -15,6 +15,7 @@ from tensorboard.plugins.hparams.metadata import (
 from tensorboardX import summary
 
 from boards import board_of, curves_of, pictures_of
+from own import MODULE
 from runs import arguments, content_of, end, stopped_at
 from sgimd_torch import InterestMap, stream
 from sgimd_torch.board import pictures
@@ -261,6 +262,14 @@ def test_outcomes_of_any_dimension_have_curves_and_pictures(own, robot):
     directory = live_as(robot)
     assert {"error/mean", "competence/R", "interest/R", "goals/missed_by"} < curves_of(directory).keys()
     assert pictures_of(directory).keys() == {"map/error", "map/competence"}
+
+
+def test_an_outcome_that_is_named_like_a_formula_has_pictures(own, module):
+    named = "self.outcomes = Box(-np.ones(2), 3 * np.ones(2), ('$\\\\frac{$', '$x_$'), '$\\\\frac{$')"
+    module("formula", MODULE.replace("        self.rest", f"        {named}\n        self.rest"))
+    words = "--environment formula:Slider2 --algorithm sagg-riac --movements 40 --evaluate-at [] --repeats 0"
+    assert command(main, [*words.replace("[]", "20").split(), "--board", "true", "--out", "runs"]) == 0
+    assert pictures_of(Path("runs/sagg-riac/seed-000")).keys() == {"map/error", "map/competence"}
 
 
 HALVES = '''

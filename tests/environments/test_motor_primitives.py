@@ -93,6 +93,25 @@ def test_a_recording_beyond_the_joint_ranges_is_fitted_inside_them() -> None:
     assert theta[[3, 7]] == pytest.approx([1.0, 1.0], abs=1e-6)  # the last knots, twice as far in the recording
 
 
+@pytest.mark.parametrize("beyond", [0.001, 0.01, 0.05])
+def test_however_little_a_knot_would_lie_outside_the_others_make_up_for_its_bound(beyond: float) -> None:
+    skill = unit_joint(9.0)
+    times = np.linspace(0, 1.2, 40)
+    inside = skill.at(np.array([1.0, 0.5, 0.2, 0.8, 0.5]), times)
+    change = skill.at(np.array([1.0, 0.5, 0.2, 0.8, 0.5]), times) - skill.at(np.array([0.0, 0.5, 0.2, 0.8, 0.5]), times)
+    shown = inside + beyond * change  # the first knot would be 1 + beyond
+    found = skill.correspondence(times, shown)
+    assert found[0] == pytest.approx(1.0, abs=1e-6)
+
+    def misfit(theta: Array) -> float:
+        return float(np.sum((skill.at(theta, times) - shown) ** 2))
+
+    # A minimum in the box: no knot inside can be moved to a better place.
+    for knot in (1, 2, 3):
+        for step in (-0.1 * beyond, 0.1 * beyond):
+            assert misfit(found + step * np.eye(5)[knot]) > misfit(found)
+
+
 @pytest.mark.parametrize(("duration", "pace"), [(0.2, 0.0), (0.8, 0.0), (1.2, 0.5), (1.6, 1.0)])
 def test_a_demonstration_is_played_at_its_own_pace_or_the_fastest_allowed(duration: float, pace: float) -> None:
     skill, theta = primitive(), stream(1, "theta").random(9)

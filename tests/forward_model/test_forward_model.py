@@ -1,5 +1,6 @@
 """The forward model: what it learns, how sure it is, and what it refuses."""
 
+import json
 import pickle
 
 import numpy as np
@@ -224,6 +225,18 @@ def test_a_saved_model_predicts_the_same_and_keeps_its_relative_error(tmp_path, 
 def test_weights_of_something_else_are_refused_by_name(tmp_path, model, header):
     path = tmp_path / "model.safetensors"
     save_file(model.state_dict(), path, header)
+    with pytest.raises(ValueError, match=r"model\.safetensors is no forward model"):
+        load_forward_model(path)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"members": 10**9}, {"theta_dim": 10**9}, {"outcome_dim": 10**9}, {"hidden": 4}],
+)
+def test_a_header_that_does_not_fit_the_weights_takes_no_memory(tmp_path, model, change):
+    path = tmp_path / "model.safetensors"
+    about = {**model.sizes, "members": model.members, "noise_heads": model.noise_heads, **change}
+    save_file(model.state_dict(), path, {"model": json.dumps(about)})
     with pytest.raises(ValueError, match=r"model\.safetensors is no forward model"):
         load_forward_model(path)
 

@@ -1,7 +1,7 @@
 """A movement may fail: it is counted and recorded, nothing is remembered of it, and the learner goes on."""
 
 import signal
-from itertools import pairwise
+from itertools import count, pairwise
 from pathlib import Path
 
 import numpy as np
@@ -9,11 +9,12 @@ import pytest
 from numpy.typing import ArrayLike
 
 from runs import content_of, end, stopped_at
-from sgimd_torch.algorithms.paper import sgim_d
+from sgimd_torch.algorithms.paper import sagg_riac, sgim_d
 from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.environments.protocol import SimulationError
-from sgimd_torch.evaluation import evaluate
+from sgimd_torch.environments.protocol import Environment, SimulationError
+from sgimd_torch.environments.toys import toss
+from sgimd_torch.evaluation import contexts_of_goals, evaluate
 from sgimd_torch.learner.events import Kind
 from sgimd_torch.record import Record
 from sgimd_torch.runs.command_line import main
@@ -253,3 +254,33 @@ def test_three_failures_are_told_and_later_ones_only_counted(robots: Path, capsy
     assert len(told) == 3
     assert all(f"movement {each}" in line for line, each in zip(told, numbers, strict=True))
     assert "further failures are only counted" in told[2]
+
+
+def measured(over: float) -> Environment:
+    """A toss whose every third measured wind is above C by this part of its side."""
+    robot, calls = toss(), count(1)
+
+    def observe(rng: np.random.Generator) -> Array:
+        box = robot.contexts
+        return box.high + over * box.sides if next(calls) % 3 == 0 else box.sample(rng)
+
+    vars(robot)["observe"] = observe
+    return robot
+
+
+def test_a_measured_context_outside_c_by_rounding_is_clipped_and_told() -> None:
+    robot = measured(1e-9)
+    with pytest.warns(RuntimeWarning, match="a context outside C by rounding was clipped"):
+        episodes = list(run(sagg_riac(robot, 0, budget=1), robot, 0, movements=6))
+    assert not any(episode.failed for episode in episodes)
+    assert [robot.contexts.contains(episode.context) for episode in episodes] == [True] * 6
+    assert episodes[2].context.tolist() == robot.contexts.high.tolist()
+    with pytest.warns(RuntimeWarning, match="was clipped"):
+        assert robot.contexts.contains(contexts_of_goals(robot, 6)).all()
+
+
+def test_a_context_far_outside_c_is_a_failed_movement_not_the_end_of_the_run() -> None:
+    robot = measured(0.1)
+    episodes = list(run(sagg_riac(robot, 0, budget=1), robot, 0, movements=6))
+    assert [bool(episode.failed) for episode in episodes] == [False, False, True] * 2
+    assert "context must lie in its box" in episodes[2].failed

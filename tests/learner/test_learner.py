@@ -7,8 +7,8 @@ from sgimd_torch.algorithms.paper import sagg_riac
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.learner import Learner
-from sgimd_torch.parts import Strategy
-from sgimd_torch.spaces import Array, Attempt, Box, Demonstration, Move
+from sgimd_torch.parts import Explore, Search, Strategy
+from sgimd_torch.spaces import Array, Attempt, Box, Demonstration, Estimate, Move
 from sgimd_torch.strategies import Mimic, Rest
 from worlds import NO_CONTEXT, demonstrate, last_posture, problem
 
@@ -238,3 +238,50 @@ def test_what_the_learner_hands_out_is_read_only() -> None:
 def test_a_context_of_another_shape_or_kind_is_refused(context: object) -> None:
     with pytest.raises(ValueError, match=r"context must .*got"):
         learner(Pursuit(context_dim=1)).ask(context)
+
+
+class Wild(Explore):
+    """An explorer whose third theta is wrong."""
+
+    wrong: object = None
+    calls = 0
+
+    def __call__(self, context: Array) -> Array:
+        self.calls += 1
+        inside = self.problem.policies.sample(self.rng)
+        return inside if self.calls < 3 else self.wrong  # type: ignore[return-value]
+
+
+class Jumpy(Search):
+    """A search whose second theta leaves Pi."""
+
+    def __call__(self, start: Estimate, goal: Array) -> Attempt:  # type: ignore[override]
+        yield start.theta  # type: ignore[misc]
+        yield self.problem.policies.high + 1  # type: ignore[misc]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        (ARM.policies.high + 1e-9, "theta of the part Wild must lie in its box"),
+        (np.full(4, np.nan), "theta of the part Wild must be finite"),
+        (np.zeros(3), r"theta of the part Wild must have shape \(..., 4\), got \(3,\)"),
+        (np.zeros((2, 4)), r"theta of the part Wild must have shape \(4,\), got \(2, 4\)"),
+        ([None] * 4, "theta of the part Wild must be real numbers"),
+    ],
+)
+def test_a_theta_that_is_no_point_of_pi_never_reaches_a_robot(wrong: object, said: str) -> None:
+    explore = type("Wild", (Wild,), {"wrong": wrong, "draws_from": "explore"})
+    robot = sagg_riac(ARM, 0, explore=explore, global_range=(1.0, 1.0))
+    executed = [step(robot) for _ in range(2)]
+    with pytest.raises(ValueError, match=said):
+        robot.ask(NO_CONTEXT)
+    with pytest.raises(RuntimeError, match="has not proposed one"):
+        robot.tell((0.1, 0.2))
+    assert len(robot.memory) == len(executed) == 2
+
+
+def test_a_search_that_leaves_pi_is_named() -> None:
+    robot = sagg_riac(ARM, 0, search=Jumpy, global_range=(0.0, 0.0), give_up=-1.0)
+    with pytest.raises(ValueError, match="theta of the part Jumpy must lie in its box"):
+        list(map(step, [robot] * 9))

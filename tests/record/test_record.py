@@ -215,3 +215,113 @@ def test_who_stopped_reading_keeps_nobody_from_writing(tmp_path):
             list(events)
     edit(path, "DELETE FROM events")
     assert caught.value.__traceback__ is not None  # the frames are still there
+
+
+def test_a_reader_that_thinks_for_long_keeps_no_lock_and_sees_one_state(tmp_path):
+    path = fill(tmp_path / "run.sqlite", n=3)
+    with Record(path) as reader, Record(path, write=True) as writer:
+        before = list(reader.rows("events"))
+        writer.add(moved([0.1, 0.2, 0.3]))
+        writer.replace_rows("goals", [(0, 0.5, 0.5)])
+        assert writer.commit(wait=False)
+        assert list(reader.rows("events")) == before
+        assert reader.check() == {}
+
+
+def test_a_commit_that_another_program_holds_up_is_made_later_and_nothing_is_lost(tmp_path):
+    path = fill(tmp_path / "run.sqlite", n=3)
+    viewer = sqlite3.connect(path, isolation_level=None)
+    with Record(path, write=True) as record:
+        viewer.execute("BEGIN")
+        viewer.execute("SELECT * FROM events").fetchall()
+        for k in range(3):
+            record.add(moved([0.1, 0.2, k]))
+            record.settle(seconds={"seconds_physics": k})
+            assert not record.commit(wait=False)
+        viewer.close()
+        assert record.commit(wait=False)
+        record.add(moved([0.1, 0.2, 9.0]))
+        record.commit()
+    with Record(path) as record:
+        assert record.check() == {}
+        assert [event.theta[2] for event in record.events() if event.kind == Kind.MOVED][3:] == [0, 1, 2, 9]
+        assert record.about["seconds"] == {"seconds_physics": 2}
+
+
+def test_another_writer_is_noticed(tmp_path):
+    path = fill(tmp_path / "run.sqlite", n=3)
+    with Record(path, write=True) as record:
+        record.add(moved([0.1, 0.2, 0.3]))
+        lock = record._lock
+
+        def late():  # another process writes between a commit and the next lock
+            edit(path, "DELETE FROM goals")
+            lock()
+
+        record._lock = late
+        with pytest.raises(RunError, match="another process has written to it"):
+            record.commit()
+
+
+@pytest.mark.parametrize(
+    "statements",
+    [
+        ["ANALYZE"],
+        ["CREATE INDEX quick ON events (kind)", "ANALYZE"],
+        ["CREATE VIEW errors_of_goals AS SELECT goal, avg(error) FROM errors GROUP BY goal"],
+    ],
+)
+def test_what_a_viewer_adds_to_a_record_is_no_damage(tmp_path, statements):
+    path = fill(tmp_path / "run.sqlite")
+    before = read(path)
+    edit(path, *statements)
+    assert read(path) == before
+    with Record(path, write=True) as record:
+        record.add(moved([0.1, 0.2, 0.3]))
+        record.commit()
+        assert record.check() == {}
+
+
+@pytest.mark.parametrize("name", ["run", "dims", "settings", "versions"])
+@pytest.mark.parametrize("column", ["name", "value", "seal"])
+def test_one_damaged_entry_about_a_run_leaves_its_movements_whole(tmp_path, name, column):
+    path = fill(tmp_path / "run.sqlite")
+    before = read(path)
+    edit(path, f"UPDATE about SET {column} = substr({column}, 2) WHERE name = '{name}'")
+    with Record(path) as record:
+        assert record.check().keys() == {"about"}
+        assert list(record.rows("events")) == before["events"]
+        assert {"run", "dims", "settings", "versions"} - record.about.keys() <= {name, "dims", "settings", "versions"}
+    with Record(path, write=True) as record, record.rewrite() as whole:
+        assert whole.check() == {}
+        assert list(whole.rows("events")) == before["events"]
+
+
+def test_a_request_is_kept_with_its_demonstration_or_not_at_all(tmp_path):
+    path = fill(tmp_path / "run.sqlite", n=3)
+    asked = Event(Kind.ASKED, np.zeros(1), goal=np.zeros(2), who="left", strategy="imitate left", reply="shown")
+    alone = asked._replace(reply="nothing")
+    with Record(path, write=True) as record:
+        for event in (alone, moved([0.1, 0.2, 0.3]), asked, Event(Kind.SHOWN, lesson=shown(7.0), who="left")):
+            record.add(event)
+        record.commit()
+    edit(path, "DELETE FROM events WHERE rowid = (SELECT max(rowid) FROM events)")
+    with Record(path, write=True) as record, record.rewrite() as cut:
+        assert [event.kind for event in cut.events()][3:] == [Kind.ASKED, Kind.MOVED]
+
+
+def test_texts_of_other_kinds_come_back_as_text_and_what_cannot_be_kept_is_refused_when_it_is_written(tmp_path):
+    path = fill(tmp_path / "run.sqlite", n=3)
+    with Record(path, write=True) as record:
+        record.add(moved([0.1, 0.2, 0.3])._replace(origin=np.str_("local")))
+        for wrong in (
+            moved([0.1, 0.2, 0.3])._replace(origin=5),
+            moved([0.1, 0.2]),
+            moved([0.1, 0.2, 0.3], goal=[0.1]),
+        ):
+            with pytest.raises(ValueError, match="a record keeps"):
+                record.add(wrong)
+        record.commit()
+    with Record(path) as record:
+        assert record.check() == {}
+        assert [event.origin for event in record.events()][-1] == "local"

@@ -8,12 +8,13 @@ import pytest
 from runs import edit, settle
 from sgimd_torch.algorithms.paper import random_exploration
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.learner.events import Kind
+from sgimd_torch.learner.events import Event, Kind
 from sgimd_torch.record import DERIVED, Record, RunError
 from sgimd_torch.record.lives import save_life
 from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.directory import FILE
 from sgimd_torch.runs.read import config_of, find_runs, finished, movements_on_disk, read_run
+from sgimd_torch.spaces import Demonstration
 
 SHORT = "--algorithm random --environment planar-arm-7 --movements 8 --evaluate_at 5 --repeats 0 --seed 3"
 
@@ -126,3 +127,45 @@ def test_runs_are_found_by_name_and_seed(tmp_path):
     assert [path.name for path in found["b"]] == ["seed-002", "seed-010"]
     assert find_runs(tmp_path / "b") == {"b": found["b"]}
     assert find_runs(found["b"][1]) == {"b": [found["b"][1]]}
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        "sgimd_torch.views.statistics:optimize._trustregion.scipy.signal._signaltools.timeit.timeit",
+        "sgimd_torch.files:os.getcwd",
+        "sgimd_torch.__main__:main",
+        "sgimd_torch.runs.tasks.robots:PlanarArm.__init__",
+    ],
+)
+def test_a_record_executes_no_code_without_trust_though_its_place_is_in_this_library(run, place):
+    found = read_run(run)
+    for name in ("environment", "algorithm"):
+        with pytest.raises(RunError, match="names code outside this library"):
+            config_of(replace(found, config={**found.config, name: place}))
+
+
+def test_a_place_of_the_catalogue_needs_no_trust(run):
+    found = read_run(run)
+    place = "sgimd_torch.runs.tasks.robots:planar_arm_7"
+    assert config_of(replace(found, config={**found.config, "environment": place}))["environment"] == place
+
+
+def test_a_request_has_the_demonstration_that_follows_it_and_no_later_one(run):
+    first, second = (Demonstration(np.zeros(0), np.arange(2.0), np.full((2, 7), k), np.full(2, k)) for k in (0.1, 0.2))
+    wanted = Event(Kind.ASKED, np.zeros(0), goal=np.full(2, 0.5), who="left", strategy="imitate left", reply="shown")
+    moved = Event(Kind.MOVED, np.zeros(0), np.full(7, 0.5), None, np.zeros(2), "imitate")
+    with Record(run / FILE, write=True) as record:
+        for event in (
+            *(wanted, Event(Kind.SHOWN, lesson=first, who="left"), moved),
+            *(Event(Kind.SHOWN, lesson=second), moved),  # somebody else, without a request
+            *(wanted._replace(reply="nothing"), Event(Kind.SHOWN, lesson=second), moved),
+            *(wanted._replace(who="right"), Event(Kind.SHOWN, lesson=second, who="right"), moved),
+        ):
+            record.add(event)
+        record.commit()
+    found = read_run(run)
+    assert found.requests["teacher"].tolist() == ["left", "left", "right"]
+    assert found.requests["shown"].tolist() == [0, -1, 1]
+    assert found.requests["index"].tolist() == [8, 10, 11]
+    assert found.demonstration[8:].tolist() == [0, 1, 1, 1]

@@ -2,6 +2,8 @@
 
 import shutil
 import signal
+import sqlite3
+import sys
 
 import numpy as np
 import pytest
@@ -23,7 +25,10 @@ from sgimd_torch.inverses.locally_linear import LocallyLinear
 from sgimd_torch.learner.events import Kind
 from sgimd_torch.record import Record
 from sgimd_torch.runs import evaluations
+from sgimd_torch.runs import run as run_module
+from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.directory import FILE
+from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import movements_on_disk, read_run
 from sgimd_torch.spaces import stream
 
@@ -192,6 +197,7 @@ def rows_of_movements(content):
         ("DELETE FROM demonstrations", 30),
         *((f"UPDATE {table} SET seal = 0 WHERE rowid = 1", 90) for table in ("goals", "evaluations", "errors")),
         ("DELETE FROM regions WHERE rowid = 1", 90),
+        *((f"UPDATE about SET value = '[1]' WHERE name = '{name}'", 90) for name in ("run", "settings", "versions")),
     ],
 )
 def test_what_is_damaged_is_made_again_only_if_the_loss_is_accepted(
@@ -290,3 +296,65 @@ def test_a_full_disk_is_reported_and_the_run_can_go_on(tmp_path, go, benchmark, 
     assert movements_on_disk(directory) < MOVEMENTS
     assert go(tmp_path, "--board", watched, "--resume") == 0
     assert content_of(directory) == reference
+
+
+def test_a_program_that_reads_the_record_all_the_time_stops_no_run(tmp_path, go, reference, monkeypatch, capsys):
+    monkeypatch.setattr(run_module, "COMMIT_EVERY", 0.0)
+    monkeypatch.setattr("sgimd_torch.record._IMPATIENCE", 0.0)
+    path, after, commit = tmp_path / "sgim-d" / "seed-003" / FILE, run_module.Life._after, run_module.Life._settle
+    viewers, last = [], []
+
+    def look(life, episode):
+        after(life, episode)
+        if episode.index == 20:
+            viewers.append(sqlite3.connect(path, isolation_level=None))
+            viewers[0].execute("BEGIN")
+            viewers[0].execute("SELECT * FROM events").fetchall()
+
+    def settle(life):
+        done = commit(life)
+        last.append((life.movements, done))
+        if last[-6:] == [(90, False)] * 6:
+            viewers[0].close()
+        return done
+
+    monkeypatch.setattr(run_module.Life, "_after", look)
+    monkeypatch.setattr(run_module.Life, "_settle", settle)
+    assert go(tmp_path) == 0
+    assert "waiting until no other program reads" in capsys.readouterr().err
+    assert content_of(path.parent) == reference
+
+
+def test_ctrl_c_during_an_evaluation_stops_after_its_movement_and_the_run_ends_as_if_it_never_was(
+    tmp_path, module, capsys
+):
+    module("plugged", PLUGGED)
+    short = "--environment plugged:Arm --algorithm random --movements 20 --evaluate-at 10 --repeats 2"
+    words = short.split()
+    plugged = [*words, "--benchmark", "null", "--out"]
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setenv("CTRL_C_AT", "15")
+        assert command(main, [*plugged, "stopped"]) == 130
+    assert "stopped after 10 movements; to go on: " in capsys.readouterr().err
+    assert sys.modules["plugged"].Arm.made == 15
+    assert movements_on_disk(tmp_path / "stopped/random/seed-000") == 10
+    assert command(main, [*plugged, "stopped", "--resume"]) == command(main, [*plugged, "whole"]) == 0
+    assert content_of(tmp_path / "stopped/random/seed-000") == content_of(tmp_path / "whole/random/seed-000")
+
+
+PLUGGED = """
+import os, signal
+from sgimd_torch.environments.planar_arm import PlanarArm
+
+class Arm(PlanarArm):
+    made, execute_many = 0, None
+
+    def __init__(self):
+        super().__init__(5)
+
+    def execute(self, context, theta, rng):
+        Arm.made += 1
+        if str(Arm.made) == os.environ.get("CTRL_C_AT"):
+            signal.raise_signal(signal.SIGINT)
+        return super().execute(context, theta, rng)
+"""

@@ -15,7 +15,7 @@ from sgimd_torch.catalogue import WORDS
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
 from sgimd_torch.runs import evaluations
 from sgimd_torch.runs.build import build
-from sgimd_torch.runs.process import Stopped, Stopping
+from sgimd_torch.runs.process import Progress, Stopped, Stopping
 from sgimd_torch.runs.read import config_of, read_run
 from sgimd_torch.spaces import Demonstration
 
@@ -134,6 +134,25 @@ def test_a_signal_is_heard_and_a_second_one_stops_at_once(capfd):
             signal.raise_signal(signal.SIGINT)
 
 
+POOL = """
+import multiprocessing, os, signal, time
+from sgimd_torch.runs.process import Stopping
+with Stopping():
+    pool = multiprocessing.get_context("fork").Pool(2)
+    pool.map(abs, range(4))
+    for worker in pool._pool:
+        os.kill(worker.pid, signal.SIGINT)  # as Ctrl-C, which reaches the whole group
+    print(pool.map(abs, range(4)))
+    pool.terminate()
+    pool.join()
+"""
+
+
+def test_workers_that_an_environment_forks_can_be_ended_and_leave_ctrl_c_to_the_run():
+    done = subprocess.run([sys.executable, "-c", POOL], env=SCRIPTS, capture_output=True, text=True, timeout=60)
+    assert (done.stdout, done.stderr, done.returncode) == ("[0, 1, 2, 3]\n", "", 0)
+
+
 SCRIPTS = {**os.environ, "PYTHONPATH": str(ROOT)}
 
 
@@ -184,3 +203,12 @@ def test_small_matrices_get_one_thread_unless_the_user_chose(chosen, threads):
         [sys.executable, "-c", program, "--version"], env=others | chosen, capture_output=True, text=True, check=True
     ).stdout
     assert said.split()[-1] == threads
+
+
+def test_the_time_that_is_left_counts_evaluations(monkeypatch, capsys):
+    clock = [0.0]
+    monkeypatch.setattr("sgimd_torch.runs.process.time.monotonic", lambda: clock[0])
+    with Progress("run", 100) as progress:
+        clock[0] = 60.0  # 50 movements in 50 s, and an evaluation of 10 s; two more are to come
+        progress.show(50, spent=10.0, later=20.0)
+    assert "50 of 100 movements, 1/s, 01:10 left" in capsys.readouterr().err

@@ -8,10 +8,11 @@ import pytest
 
 from runs import ROOT, about_of, content_of
 from sgimd_torch.files import checksum
-from sgimd_torch.runs.command_line import main
+from sgimd_torch.runs.command_line import main, parse
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.directory import sources
 from sgimd_torch.runs.process import command
+from sgimd_torch.runs.read import finished
 
 SHORT = (
     "--environment sliders:Slider --algorithm random --movements 40 --evaluate-at 20 --repeats 0 --inverse linear --out"
@@ -78,3 +79,24 @@ def test_processes_of_many_runs_find_the_working_directory(own, what):
     assert done.returncode == 0, done.stderr
     names = {path.parent.parent.name for path in own.rglob("run.sqlite")}
     assert {"learners:mine", "algorithm=learners:mine"} & names
+
+
+def test_an_option_whose_default_is_nan_changes_nothing_and_the_run_can_go_on(module, capsys):
+    module(
+        "unset",
+        "from sgimd_torch.runs.tasks.robots import planar_arm_7\n"
+        'def make(*, limit: float = float("nan")):\n    return planar_arm_7()\n',
+    )
+    short = "--environment unset:make --algorithm random --movements 5 --evaluate-at [] --out runs"
+    words = short.split()
+    assert command(main, words) == command(main, [*words, "--resume", "--movements", "6"]) == 0
+    assert finished(parse([*words, "--movements", "6"])[0])
+    assert command(main, [*words, "--movements", "7", "--environment.limit", "1.0", "--resume"]) == 2
+    assert "environment.limit was nan, now 1.0" in capsys.readouterr().err
+
+
+def test_a_path_that_sqlite_cannot_open_is_refused_by_its_length(tmp_path, capsys):
+    words = ["--algorithm", "random", "--movements", "3", "--evaluate-at", "[]"]
+    assert command(main, [*words, "--out", str(tmp_path / "/".join(["x" * 100] * 6))]) == 2
+    assert "has more than 504 bytes; choose a shorter --out" in capsys.readouterr().err
+    assert not any(tmp_path.iterdir())

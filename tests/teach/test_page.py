@@ -129,6 +129,7 @@ OWN = {"Host": "127.0.0.1:8080", "Origin": "http://127.0.0.1:8080"}
         (ADDRESS, OWN | {"Origin": "http://127.0.0.1:8081"}, 403),  # another page of this machine
         (ADDRESS, {"Origin": "http://127.0.0.1:8080"}, 403),
         (ADDRESS + "&x=" + "x" * 5000, OWN, 414),
+        (ADDRESS, OWN | {"Host": "["}, 403),
     ],
 )
 def test_only_a_page_with_the_token_in_its_address_is_answered(path, headers, status):
@@ -140,6 +141,14 @@ def test_only_a_page_with_the_token_in_its_address_is_answered(path, headers, st
         cookie = response.headers["Set-Cookie"].partition(";")[0]
         assert guarded(Refuse(), Request("/", Headers(**headers, Cookie=cookie))).status_code == 200
         assert guarded(Refuse(), Request("/", Headers(**headers, Cookie=f"{cookie}x"))).status_code == 403
+
+
+@pytest.mark.parametrize("name", ["Host", "Origin", "Cookie"])
+def test_two_headers_of_one_name_are_refused(name):
+    guarded = guard("secret", lambda connection, request: connection.respond(HTTPStatus.OK, "the page"))
+    headers = Headers(**OWN | {name: OWN.get(name, "a=b")})
+    headers[name] = OWN.get(name, "a=b")  # adds a second one
+    assert guarded(Refuse(), Request(ADDRESS, headers)).status_code == 403
 
 
 def test_the_served_page_asks_for_the_token_and_no_request_gets_an_error_of_the_server(tmp_path):

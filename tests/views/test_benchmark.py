@@ -1,8 +1,11 @@
 """Goals made from runs: near what they reached, from all of them together, for outcomes of any dimension."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from runs import settle
 from sgimd_torch.evaluation import SIDES, load_benchmark, tile_side
 from sgimd_torch.runs.command_line import main as live
 from sgimd_torch.runs.process import command
@@ -103,3 +106,13 @@ def test_what_cannot_be_made_is_refused_in_a_line_and_nothing_is_written(own, ca
     assert message in said
     assert "Traceback" not in said
     assert sorted(path for path in own.rglob("*") if "__pycache__" not in str(path)) == before
+
+
+def test_a_unit_with_escape_codes_does_not_reach_the_terminal(own, capsys):
+    run("--environment", "sliders:Slider2")
+    found = read_run("runs/random/seed-000")
+    spaces = {name: [box.low.tolist(), box.high.tolist(), box.names, "\x1b[31m"] for name, box in found.spaces.items()}
+    settle(Path("runs/random/seed-000"), spaces=spaces)
+    capsys.readouterr()
+    goals_of("runs", "--tiles", 20)
+    assert "\x1b" not in capsys.readouterr().out

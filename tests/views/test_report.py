@@ -107,6 +107,14 @@ def test_whatever_runs_say_is_text_and_never_markup(pages, run, tmp_path):
     assert "49" not in Page(made).all("td")
 
 
+def test_names_are_no_formulas_and_commands_have_no_control_characters(run, tmp_path):
+    space = Box.cube(-1, 1, 2, names=("$\\frac{$", "$x_$"), unit="$\\frac{$")
+    odd = replace(run, spaces={**run.spaces, "outcomes": space}, words=["--name=\x1b[31m", "--algorithm=sgim-d"])
+    made = page(tmp_path, [Variant("$\\frac{$", [odd]), Variant("other", [run])])
+    assert "\x1b" not in made
+    assert len(Page(made).all("h2")) >= 2
+
+
 def test_the_numbers_of_a_run_are_those_of_its_evaluations(pages, run):
     mean, floor = run.at(60), run.at(60, "noise_floor")
     assert f"lands {mean:.3f} m from a goal after 60 movements" in pages["one"]

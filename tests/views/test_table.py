@@ -133,6 +133,14 @@ def test_a_damaged_run_is_named_and_nothing_is_printed(copied, capsys):
     assert str(path) in said.err
 
 
+def test_a_folder_without_a_run_is_named(copied, capsys):
+    shutil.move(copied / "random/seed-001/run.sqlite", copied / "random/seed-001/run.sqlite.bak")
+    assert table(copied) == 0
+    said = capsys.readouterr()
+    assert f"left out: {copied / 'random/seed-001'} has no run.sqlite that can be read" in said.err
+    assert next(line for line in said.out.splitlines() if line.startswith("random")).split()[1] == "4"
+
+
 def last_column(said):
     """Of each variant, and the head of the column."""
     head, *lines = said.splitlines()

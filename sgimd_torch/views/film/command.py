@@ -70,7 +70,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     with _painter(parts.environment, shots) as painter:
         rate = RATES[options.out.suffix]
         n = sum(len(shot.moments(rate)) for shot in shots)
-        write_film(options.out, tqdm(shoot(painter, shots, rate), "filming", n, unit=" frames", delay=1.0))
+        write_film(
+            options.out, tqdm(shoot(painter, shots, rate), "filming", n, unit=" frames", delay=1.0, disable=None)
+        )
     amount, missed = parts.environment.outcomes.amount, np.reshape([shot.missed for shot in shots], (len(stages), -1))
     for movements, each in zip(stages, missed, strict=True):
         mean, most = amount(each.mean()), amount(each.max())

@@ -33,6 +33,7 @@ WIDE: Final = 4.3  # inches, width of the axes of a map, without colour bar
 MARGIN: Final = 1.2  # inches, height above and below the axes
 STYLE: Final[Any] = {
     "font.size": 11,
+    "text.parse_math": False,  # names of a user are no formulas
     "axes.titlesize": 11,
     "axes.spines.top": False,
     "axes.spines.right": False,
@@ -168,9 +169,9 @@ def _panels(figure: Figure, shown: Sequence[Section]) -> list[Axes]:
 
 
 def _plain(name: str) -> str:
-    """A name as a matplotlib label: shortened, not read as a formula ($), and not hidden (by a leading _)."""
+    """A name as a matplotlib label: shortened, and not hidden (by a leading _)."""
     short = name if len(name) <= 32 else f"{name[:30]}…"
-    return f"{' ' * short.startswith('_')}{short}".replace("$", r"\$")
+    return f"{' ' * short.startswith('_')}{short}"
 
 
 def _seeds(n: int) -> str:

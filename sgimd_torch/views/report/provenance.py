@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
 from sgimd_torch.runs.config import PLACE
+from sgimd_torch.runs.process import printable
 from sgimd_torch.runs.read import Run
 from sgimd_torch.views.statistics import LEAST_SEEDS
 from sgimd_torch.views.variants import Variant
@@ -59,7 +60,7 @@ def commands(runs: Sequence[Run]) -> list[str]:
     groups: dict[str, list[int]] = {}
     for run in runs:
         own = [word for word in run.words if word.partition("=")[0] not in ("--seed", "--out", "--board")]
-        groups.setdefault(shlex.join(own), []).append(int(run.config["seed"]))
+        groups.setdefault(printable(shlex.join(own)), []).append(int(run.config["seed"]))
     lines = list[str]()
     for given, seeds in groups.items():
         line = f"sgimd run {given} --seed={'$seed' if len(seeds) > 1 else seeds[0]} --out={AGAIN}"
