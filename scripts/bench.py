@@ -132,9 +132,11 @@ def at_once(movements: int) -> Figures:
     from sgimd_torch.session import JOINS_EVERY
 
     figures: Figures = {}
-    for name, robot, numbers in (("rod", FishingRod(), (1, 2, 8)), ("an arm of 20 ms", SlowArm(7, noise=0.02), (1, 2))):
+    robots = ("rod", FishingRod, (1, 2, 8)), ("an arm of 20 ms", partial(SlowArm, 7, noise=0.02), (1, 2))
+    for name, make, numbers in robots:
         for number in numbers:
-            with executing(robot, 0, number) as execute:
+            robot: Any = make()
+            with executing(robot, make, 0, number) as execute:
                 life = run(practice(robot, 0), robot, 0, movements=10**9, execute=execute, at_once=number)
                 for _ in range(JOINS_EVERY * number):  # all robots join, processes start
                     next(life)
