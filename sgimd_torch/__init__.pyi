@@ -11,6 +11,7 @@ from .demonstrations import save_demonstrations as save_demonstrations
 from .environments.check import check_environment as check_environment
 from .environments.fishing_rod import FishingRod as FishingRod
 from .environments.motor_primitives import GaussianPrimitive as GaussianPrimitive
+from .environments.mujoco_robot import MujocoRobot as MujocoRobot
 from .environments.planar_arm import PlanarArm as PlanarArm
 from .environments.protocol import Environment as Environment
 from .environments.protocol import SimulationError as SimulationError

@@ -10,6 +10,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Final, Protocol, runtime_checkable
 
 import numpy as np
@@ -110,6 +111,21 @@ class HasPrimitive(Protocol):
     @property
     def primitive(self) -> Primitive:
         """Primitive of this robot."""
+        ...
+
+
+@runtime_checkable
+class FromFiles(Protocol):
+    """An environment that is read from files, such as a `MujocoRobot`."""
+
+    @property
+    def files(self) -> Sequence[Path]:
+        """All files; a run keeps their checksums."""
+        ...
+
+    @property
+    def remarks(self) -> Sequence[str]:
+        """Sentences for the user about choices that the environment made."""
         ...
 
 

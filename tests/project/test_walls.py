@@ -36,6 +36,8 @@ LIBRARIES = {  # rooms or single files that may import a library, by library
     "numba": {"memory/compiled", "memory/scan", "inverses/kernels"},
     "mujoco": {
         "environments/rod_physics",
+        "environments/mujoco_model",
+        "environments/mujoco_robot",
         "views/film",
         "teach",
     },
