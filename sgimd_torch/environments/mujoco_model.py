@@ -1,14 +1,14 @@
-"""Models of MuJoCo: MJCF and URDF files, the names in them, and the places that an outcome or a context is made of.
+"""Models of MuJoCo: MJCF and URDF files, and what a text such as "site:tip:xy" names in them.
 
-model = load_model(Path("arm.xml"), ()); places = outcome_places(model, "site:tip:xy"); places[0].read(data)
+model, remarks = load_model(Path("arm.xml"), ()); place, = outcome_places(model, "site:tip:xy"); place.read(data)
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import mujoco
 import numpy as np
@@ -16,11 +16,13 @@ import numpy as np
 from sgimd_torch.catalogue import did_you_mean
 from sgimd_torch.spaces import Array, Box, stream
 
-KINDS: Final = {"site": "nsite", "body": "nbody", "geom": "ngeom", "joint": "njnt"}  # kinds of places, and their counts
+_COUNTS: Final = {"site": "nsite", "body": "nbody", "geom": "ngeom", "joint": "njnt"}
 _AXES: Final = "xyz"
-_HINGE, _SLIDE, _FREE = (int(getattr(mujoco.mjtJoint, f"mjJNT_{name}")) for name in ("HINGE", "SLIDE", "FREE"))
-_STIFFNESS: Final = 30.0  # natural frequency (rad/s) of a position servo that is made for a joint
-_SAG: Final = 0.05  # largest error (rad or m) of such a servo that holds a joint against gravity
+_UNITS: Final = {int(mujoco.mjtJoint.mjJNT_HINGE): "rad", int(mujoco.mjtJoint.mjJNT_SLIDE): "m"}  # of joints
+_FREE: Final = int(mujoco.mjtJoint.mjJNT_FREE)
+_ON_JOINT: Final = {int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT)}
+_FREQUENCY: Final = 30.0  # natural frequency (rad/s) of a position servo that is made for a joint
+_SAG: Final = 0.05  # largest error (rad or m) of such a servo when it holds a joint against gravity
 
 
 @dataclass(frozen=True)
@@ -33,22 +35,26 @@ class Place:
         number: index in the model.
         axes: indices of the coordinates; () for a joint.
         unit: "m" or "rad".
-        address: index of the position of a joint in ``qpos``; -1 for other kinds.
+        address: index of the position of a joint in ``qpos``.
     """
 
     kind: str
     name: str
     number: int
-    axes: tuple[int, ...]
-    unit: str
-    address: int = -1
+    axes: tuple[int, ...] = ()
+    unit: str = "m"
+    address: int = 0
 
     def read(self, data: mujoco.MjData) -> Array:
         """The coordinates now."""
         if self.kind == "joint":
-            return data.qpos[self.address : self.address + 1].copy()
-        places = {"site": data.site_xpos, "body": data.xpos, "geom": data.geom_xpos}[self.kind]
-        return places[self.number, list(self.axes)]
+            return data.qpos[[self.address]]
+        return self.position(data)[list(self.axes)]
+
+    def position(self, data: mujoco.MjData) -> Array:
+        """``(3,)`` m, the position now; of a joint, its anchor."""
+        places = {"site": data.site_xpos, "body": data.xpos, "geom": data.geom_xpos, "joint": data.xanchor}
+        return places[self.kind][self.number].copy()
 
     @property
     def names(self) -> list[str]:
@@ -63,74 +69,44 @@ def load_model(path: Path, joints: Sequence[str]) -> tuple[mujoco.MjModel, list[
         ValueError: MuJoCo refuses the file, or there is nothing that moves.
         OSError: there is no such file.
     """
-    with open(path, "rb"):  # MuJoCo's own message of a missing file is no OSError
-        pass
-    remarks = list[str]()
+    path.open("rb").close()  # MuJoCo's own message of a missing file is no OSError
     try:
         spec = mujoco.MjSpec.from_file(str(path))
         spec.compiler.fusestatic = False  # else links on fixed joints of a URDF, such as its tool, lose their names
         model = spec.compile()
-        if not model.nu:
-            served = _serve(spec, model, joints or [name for name in names_of(model, "joint") if name])
-            remarks.append(f"{path.name} has no actuators: position servos were made for {', '.join(served)}")
-            model = spec.compile()
+        if model.nu:
+            return model, []
+        served = _serve(spec, model, joints)
+        remark = f"{path.name} has no actuators: position servos were made for {', '.join(served)}"
+        return spec.compile(), [remark]
     except ValueError as error:
         raise ValueError(f"{path.name} cannot be used: {' '.join(str(error).split())}") from error
-    return model, remarks
 
 
 def files_of(path: Path) -> list[Path]:
     """The file of a model, and all files that it includes or refers to, such as meshes."""
-    spec, found = mujoco.MjSpec.from_file(str(path)), {path}
-    found |= {Path(each) for each in mujoco.mju_getXMLDependencies(str(path))}
+    spec, found = mujoco.MjSpec.from_file(str(path)), {path, *map(Path, mujoco.mju_getXMLDependencies(str(path)))}
     found |= {path.parent / spec.meshdir / each.file for each in spec.meshes if each.file}  # of a URDF
-    return sorted(each for each in found if each.is_file())
-
-
-def names_of(model: mujoco.MjModel, kind: str) -> list[str]:
-    """Names of all sites, bodies, geoms or joints; "" for one without a name."""
-    one: Callable[[int], Any] = getattr(model, kind)
-    return [one(k).name for k in range(getattr(model, KINDS[kind]))]
-
-
-def find(model: mujoco.MjModel, kind: str, name: str, what: str) -> int:
-    """Index of a named thing of the model.
-
-    Raises:
-        ValueError: there is none; the message has near names, or the kind that has this name.
-    """
-    if kind not in KINDS:
-        raise ValueError(f"{what}: write KIND:NAME, such as site:tip; kinds are {', '.join(KINDS)}, got {kind!r}")
-    names = names_of(model, kind)
-    if name in names and name:
-        return names.index(name)
-    known = [each for each in names if each]
-    others = [each for each in KINDS if each != kind and name and name in names_of(model, each)]
-    near = did_you_mean(name, known, 3) or f"; {kind}s with a name are: {', '.join(known[:20]) or 'none'}"
-    hint = f"; write {others[0]}:{name}" if others else near
-    raise ValueError(f"{what}: the model has no {kind} {name!r}{hint}")
+    return sorted({each.resolve() for each in found if each.is_file()})
 
 
 def outcome_places(model: mujoco.MjModel, outcome: str) -> list[Place]:
     """The places that ``outcome`` lists, such as "site:tip:xy,body:cup".
 
     Raises:
-        ValueError: the text names nothing of the model, or lengths and angles.
+        ValueError: the text names nothing of the model, or both lengths and angles.
     """
     if not outcome:
-        each = [f"{kind}:{name}" for kind in KINDS for name in names_of(model, kind) if name not in ("", "world")]
-        raise ValueError(f"outcome is missing: it names what goals are about, one of {', '.join(each[:20])}")
+        known = [f"{kind}:{name}" for kind in _COUNTS for name in _names(model, kind) if name != "world"]
+        raise ValueError(f"outcome is missing: it names what goals are about, such as {', '.join(known[:20])}")
     places = []
     for text in outcome.split(","):
-        kind, _, rest = text.strip().partition(":")
-        name, _, axes = rest.partition(":")
-        number, what = find(model, kind, name, f"outcome {text!r}"), f"outcome {text!r}"
-        if kind == "joint":
-            places.append(_joint(model, number, what, axes))
-        elif not set(axes) <= set(_AXES) or len(set(axes)) < len(axes):
-            raise ValueError(f"{what}: {axes!r} are no axes; write x, y, z or several of them, such as {text[:-1]}xy")
-        else:
-            places.append(Place(kind, name, number, tuple(map(_AXES.index, axes or _AXES)), "m"))
+        kind, name, axes = (*text.strip().split(":", 2), "", "")[:3]
+        place = _find(model, f"outcome {text!r}", kind, name)
+        if not set(axes) <= set(_AXES if kind != "joint" else "") or len(set(axes)) < len(axes):
+            raise ValueError(f"outcome {text!r}: {axes!r} are no axes; write some of x, y and z, for a joint nothing")
+        axes = axes or _AXES if kind != "joint" else ""
+        places.append(Place(kind, name, place.number, tuple(map(_AXES.index, axes)), place.unit, place.address))
     if len({each.unit for each in places}) > 1:
         raise ValueError(f"outcome {outcome!r} mixes lengths (m) and angles (rad); a goal needs one unit")
     return places
@@ -142,40 +118,33 @@ def context_box(model: mujoco.MjModel, context: str) -> tuple[Box, list[int]]:
     Args:
         model: model of the robot and its objects.
         context: list such as "body:cup:x:0.1:0.3,joint:door:0:1": for each dimension an axis of a free body, or a
-            joint, and its lowest and highest initial position; "" for none.
+            joint, then its lowest and highest initial position; "" for none.
 
     Raises:
         ValueError: the text names nothing of the model, a body is not free, or a number is wrong.
     """
-    sides, names, units, addresses = list[tuple[float, float]](), list[str](), list[str](), list[int]()
+    sides, names, units, addresses = list[list[float]](), list[str](), list[str](), list[int]()
     for text in filter(None, context.split(",")):
         kind, *words = text.strip().split(":")
-        what, wanted = f"context {text!r}", 4 if kind == "body" else 3
-        if kind not in ("body", "joint") or len(words) != wanted:
+        what = f"context {text!r}"
+        if (kind, len(words)) not in (("body", 4), ("joint", 3)):
             raise ValueError(f"{what}: write body:NAME:AXIS:LOW:HIGH for a free body, or joint:NAME:LOW:HIGH")
+        place, (low, high) = _find(model, what, kind, words[0]), words[-2:]
+        address, name = place.address, " ".join(words[:-2])
+        if kind == "body":
+            joint = int(model.body_jntadr[place.number])
+            if joint < 0 or model.jnt_type[joint] != _FREE or words[1] not in tuple(_AXES):
+                raise ValueError(f"{what}: only a body with a free joint has an axis x, y or z; else write joint:NAME")
+            address = int(model.jnt_qposadr[joint]) + _AXES.index(words[1])
         try:
-            low, high = map(float, words[-2:])
+            sides.append([float(low), float(high)])
+            Box(*np.array(sides[-1:]).T)
         except ValueError:
-            raise ValueError(f"{what}: {words[-2]} and {words[-1]} must be numbers, in m or rad") from None
-        number = find(model, kind, words[0], what)
-        if kind == "joint":
-            place = _joint(model, number, what)
-            address, name, unit = place.address, place.name, place.unit
-        else:
-            body = model.body(number)
-            joints = [model.joint(k) for k in range(body.jntadr[0], body.jntadr[0] + body.jntnum[0])]
-            if [each.type[0] for each in joints] != [_FREE] or words[1] not in tuple(_AXES):
-                own = f"; write joint:NAME with one of {', '.join(each.name for each in joints)}" if joints else ""
-                raise ValueError(f"{what}: only a body with a free joint has an AXIS to set, x, y or z{own}")
-            address, name, unit = joints[0].qposadr[0] + _AXES.index(words[1]), f"{words[0]} {words[1]}", "m"
-        sides.append((low, high))
-        names.append(name)
-        units.append(unit)
-        addresses.append(int(address))
-    try:
-        return _box(sides, names, units), addresses
-    except ValueError as error:
-        raise ValueError(f"context {context!r}: {error}") from error
+            raise ValueError(f"{what}: {low} and {high} must be two numbers, the lower one first") from None
+        names.append(name if place.unit == "m" else f"{name} ({place.unit})")
+        units.append(place.unit)
+        addresses.append(address)
+    return Box(*np.array(sides).reshape(-1, 2).T, tuple(names), "m" if {*units} == {"m"} else ""), addresses
 
 
 def commands_box(model: mujoco.MjModel, joints: Sequence[str]) -> tuple[Box, list[int], list[str]]:
@@ -183,121 +152,115 @@ def commands_box(model: mujoco.MjModel, joints: Sequence[str]) -> tuple[Box, lis
 
     Args:
         model: model of the robot.
-        joints: names of joints or of actuators; () for all actuators.
+        joints: names of joints, or of actuators that act on no joint; () for all actuators.
 
     Raises:
         ValueError: a joint does not exist or has no actuator, or a command has no range.
     """
-    actuators = [model.actuator(k) for k in range(model.nu)]
-    moved: dict[str, list[int]] = {each.name: [each.id] for each in actuators if each.name}
-    for each in actuators:
-        if each.trntype[0] in (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT):
-            moved[model.joint(each.trnid[0]).name] = [
-                k.id for k in actuators if k.trntype[0] == each.trntype[0] and k.trnid[0] == each.trnid[0]
-            ]
+    moved, sides, remarks = dict[str, list[int]](), list[Array](), list[str]()
+    for k in range(model.nu):
+        joint = joint_of(model, k)
+        moved.setdefault(model.actuator(k).name if joint is None else model.joint(joint).name, []).append(k)
     for name in joints:
         if name not in moved:
-            number = find(model, "joint", name, "joints")
-            raise ValueError(f"joints: {names_of(model, 'joint')[number]} has no actuator; {', '.join(moved)} have one")
-    chosen = list(dict.fromkeys(k for name in joints for k in moved[name])) or list(range(model.nu))
-    sides, names, units, remarks = list[tuple[float, float]](), list[str](), list[str](), list[str]()
+            hint = did_you_mean(name, moved) or f"; known are {', '.join(moved)}"
+            raise ValueError(f"joints: {name!r} is no joint with an actuator{hint}")
+    chosen = [k for name in joints or moved for k in moved[name]]
     for k in chosen:
-        actuator, low, high, unit = actuators[k], *model.actuator_ctrlrange[k], ""
-        joint = model.joint(actuator.trnid[0]) if is_servo(model, k) and "JOINT" in _transmission(actuator) else None
-        if joint is not None:
-            unit = "rad" if joint.type[0] == _HINGE else "m"
+        joint, side = joint_of(model, k), model.actuator_ctrlrange[k]
         if not model.actuator_ctrllimited[k]:
-            if joint is None or (unit == "m" and not model.jnt_limited[joint.id]):
-                raise ValueError(f"actuator {actuator.name!r} has no ctrlrange; write one into the model")
-            low, high = np.array(joint.range if model.jnt_limited[joint.id] else (-np.pi, np.pi)) * actuator.gear[0]
-            if not model.jnt_limited[joint.id]:
-                remarks.append(f"joint {joint.name} has no range: it turns from -pi to pi")
-        sides.append((float(min(low, high)), float(max(low, high))))
-        names.append(actuator.name or (joint.name if joint is not None else f"actuator {k}"))
-        units.append(unit)
-    return _box(sides, names, units), chosen, remarks
+            if joint is None or not _is_servo(model, k):
+                raise ValueError(f"actuator {model.actuator(k).name!r} has no ctrlrange; write one into the model")
+            side = model.jnt_range[joint]
+            if not model.jnt_limited[joint]:
+                side = np.array([-np.pi, np.pi])
+                remarks.append(f"joint {model.joint(joint).name} has no range: -pi to pi is used")
+            side = np.sort(side * model.actuator_gear[k, 0])
+        sides.append(side)
+    return Box(*np.array(sides).T), chosen, remarks
 
 
-def is_servo(model: mujoco.MjModel, actuator: int) -> bool:
-    """Whether a command of this actuator is a position to go to."""
-    affine = model.actuator_biastype[actuator] == mujoco.mjtBias.mjBIAS_AFFINE
-    return bool(affine and model.actuator_biasprm[actuator, 1] < 0 < model.actuator_gainprm[actuator, 0])
+def joint_of(model: mujoco.MjModel, actuator: int) -> int | None:
+    """The joint that an actuator acts on; None if it acts on something else."""
+    return int(model.actuator_trnid[actuator, 0]) if int(model.actuator_trntype[actuator]) in _ON_JOINT else None
 
 
 def holding(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
     """``(nu,)`` commands that hold the present posture: positions of servos; other commands stay as they are."""
     held = data.ctrl.copy()
-    for k in filter(lambda k: is_servo(model, k), range(model.nu)):
-        bias, slope = model.actuator_biasprm[k, :2]
-        held[k] = -(bias + slope * data.actuator_length[k]) / model.actuator_gainprm[k, 0]
-        if model.actuator_ctrllimited[k]:
-            held[k] = np.clip(held[k], *model.actuator_ctrlrange[k])
-    return held
+    for k in range(model.nu):
+        if _is_servo(model, k):
+            bias, slope = model.actuator_biasprm[k, :2]
+            held[k] = -(bias + slope * data.actuator_length[k]) / model.actuator_gainprm[k, 0]
+    return np.where(model.actuator_ctrllimited, np.clip(held, *model.actuator_ctrlrange.T), held)
 
 
-def chain_to(model: mujoco.MjModel, place: Place, actuators: Sequence[int]) -> list[int]:
-    """Bodies from the base of the robot to ``place`` if the robot carries it, else to the last body that it moves."""
-    joints = [int(model.actuator_trnid[k, 0]) for k in actuators if "JOINT" in _transmission(model.actuator(k))]
-    driven = {int(model.jnt_bodyid[k]) for k in joints}
-    of_place = {"site": model.site_bodyid, "geom": model.geom_bodyid, "joint": model.jnt_bodyid}.get(place.kind)
-    body = place.number if of_place is None else int(of_place[place.number])
+def chain_to(model: mujoco.MjModel, place: Place, actuators: Sequence[int]) -> tuple[list[int], bool]:
+    """Bodies from the base of the robot to ``place`` if the robot carries it, else to the last one; and if it does."""
+    bodies = {"site": model.site_bodyid, "geom": model.geom_bodyid, "joint": model.jnt_bodyid}.get(place.kind)
+    driven = {int(model.jnt_bodyid[joint]) for k in actuators if (joint := joint_of(model, k)) is not None}
 
     def path(body: int) -> list[int]:
         return [*path(int(model.body_parentid[body])), body] if body else []
 
-    if driven & {*path(body)} or not driven:
-        return path(body)
-    return max(map(path, driven), key=len)
+    there = path(place.number if bodies is None else int(bodies[place.number]))
+    carried = not driven or bool(driven & {*there})
+    return there if carried else max(map(path, driven), key=len), carried
 
 
-def _transmission(actuator: Any) -> str:
-    return mujoco.mjtTrn(actuator.trntype[0]).name
+def _names(model: mujoco.MjModel, kind: str) -> list[str]:
+    names = [getattr(model, kind)(k).name for k in range(getattr(model, _COUNTS[kind]))]
+    return [name for name in names if name]
 
 
-def _joint(model: mujoco.MjModel, number: int, what: str, axes: str = "") -> Place:
-    joint = model.joint(number)
-    if joint.type[0] not in (_HINGE, _SLIDE) or axes:
-        raise ValueError(f"{what}: only a hinge or a slide joint is a place, and it has no axes")
-    unit = "rad" if joint.type[0] == _HINGE else "m"
-    return Place("joint", joint.name, number, (), unit, int(joint.qposadr[0]))
+def _find(model: mujoco.MjModel, what: str, kind: str, name: str) -> Place:
+    """The place without axes; the message of an error begins with ``what`` and has near names."""
+    if kind not in _COUNTS:
+        raise ValueError(f"{what}: write KIND:NAME, such as site:tip; kinds are {', '.join(_COUNTS)}")
+    names = _names(model, kind)
+    if name not in names:
+        others = [f"; write {each}:{name}" for each in _COUNTS if name in _names(model, each)]
+        near = did_you_mean(name, names, 3) or f"; {kind}s with a name: {', '.join(names[:20]) or 'none'}"
+        raise ValueError(f"{what}: the model has no {kind} {name!r}{others[0] if others else near}")
+    number = int(getattr(model, kind)(name).id)
+    if kind != "joint":
+        return Place(kind, name, number)
+    if model.jnt_type[number] not in _UNITS:
+        raise ValueError(f"{what}: only a hinge or a slide joint has one position; write body:NAME")
+    return Place(kind, name, number, (), _UNITS[int(model.jnt_type[number])], int(model.jnt_qposadr[number]))
 
 
-def _box(sides: Sequence[tuple[float, float]], names: Sequence[str], units: Sequence[str]) -> Box:
-    """A box; if units differ, each name has its own."""
-    low, high = np.array(sides).reshape(-1, 2).T
-    if len({*units}) > 1:
-        return Box(
-            low, high, tuple(f"{name} ({unit})" if unit else name for name, unit in zip(names, units, strict=True))
-        )
-    return Box(low, high, tuple(names), "".join({*units}))
+def _is_servo(model: mujoco.MjModel, actuator: int) -> bool:
+    """Whether a command of this actuator is a position to go to."""
+    affine = model.actuator_biastype[actuator] == mujoco.mjtBias.mjBIAS_AFFINE
+    return bool(affine and model.actuator_biasprm[actuator, 1] < 0 < model.actuator_gainprm[actuator, 0])
 
 
 def _serve(spec: mujoco.MjSpec, model: mujoco.MjModel, joints: Sequence[str]) -> list[str]:
-    """Add a position servo to each hinge or slide of ``joints``; the result is their names.
+    """Add a position servo to each hinge and slide of ``joints``, () for all of them; returns their names.
 
-    The stiffness moves the greatest inertia of a joint with 30 rad/s, and holds it against gravity.
+    A servo moves the greatest inertia of its joint with the natural frequency, and holds it against gravity.
     """
-    numbers = [find(model, "joint", name, "joints") for name in joints]
-    chosen = [k for k in numbers if model.jnt_type[k] in (_HINGE, _SLIDE)]
+    wanted = [_find(model, "joints", "joint", name).number for name in joints] or range(model.njnt)
+    chosen = [k for k in wanted if int(model.jnt_type[k]) in _UNITS and model.joint(k).name]
     if not chosen:
-        raise ValueError("it has no joint that turns or slides")
+        raise ValueError("it has no joint with a name that turns or slides")
     data, inertias, loads = mujoco.MjData(model), np.zeros(model.nv), np.zeros(model.nv)
-    for k in range(50):
-        data.qpos[:] = model.qpos0
-        for joint, share in zip(chosen, stream(0, "postures", k).random(len(chosen)), strict=True):
-            low, high = model.jnt_range[joint] if model.jnt_limited[joint] else (-np.pi, np.pi)
-            data.qpos[model.jnt_qposadr[joint]] = low + share * (high - low)
+    for posture in range(50):
+        shares = stream(0, "postures", posture).random(model.njnt)
+        for k in chosen:
+            low, high = model.jnt_range[k] if model.jnt_limited[k] else (-np.pi, np.pi)
+            data.qpos[model.jnt_qposadr[k]] = low + shares[k] * (high - low)
         mujoco.mj_forward(model, data)
         loads = np.maximum(loads, np.abs(data.qfrc_bias))
         for dof, unit in enumerate(np.eye(model.nv)):
             product = np.empty(model.nv)
             mujoco.mj_mulM(model, data, product, unit)
             inertias[dof] = max(inertias[dof], product[dof])
-    for joint in chosen:
-        dof = model.jnt_dofadr[joint]
-        stiffness = max(inertias[dof] * _STIFFNESS**2, loads[dof] / _SAG)
-        servo = spec.add_actuator(name=model.joint(joint).name, target=model.joint(joint).name)
-        servo.trntype = mujoco.mjtTrn.mjTRN_JOINT
-        servo.set_to_position(kp=stiffness, kv=2 * np.sqrt(stiffness * inertias[dof]))
+    for k in chosen:
+        name, inertia, load = model.joint(k).name, *(each[model.jnt_dofadr[k]] for each in (inertias, loads))
+        stiffness = max(inertia * _FREQUENCY**2, load / _SAG)
+        servo = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+        servo.set_to_position(kp=stiffness, kv=2 * np.sqrt(stiffness * inertia))
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST  # stable with the damping of light joints
     return [model.joint(k).name for k in chosen]

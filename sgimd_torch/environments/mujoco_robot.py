@@ -153,14 +153,16 @@ class MujocoRobot:
         if states is None:
             raise SimulationError(f"the simulation diverged in context {context.tolist()}", theta)
         every = max(1, round(1 / (_FRAMES * self.model.opt.timestep)))
-        place, carried = self._places[0], chain_to(self.model, self._places[0], self._actuators)
+        place, data, outcome, chains = self._places[0], self._data[0], self._outcome(states), list[Array]()
+        bodies, carried = chain_to(self.model, place, self._actuators)
         axes = [*place.axes, *(k for k in range(3) if k not in place.axes)][:2]
-        shift = self._read(states[0])[: len(place.axes[:2])] if self._displacement else 0.0
-        chains = []
-        for state in states[::every]:
+        for state in (states[0], *states[::-every][::-1]):  # the last drawing shows the outcome
             self._read(state)
-            chains.append(self._data[0].xpos[carried][:, axes] - shift)
-        return Sketch(self._outcome(states), every * self.model.opt.timestep, np.stack(chains))
+            points = np.vstack([data.xpos[bodies], *[place.position(data)] * carried])[:, axes]
+            if not chains:
+                origin = points[-1] if self._displacement and carried else 0.0
+            chains.append(points - origin)
+        return Sketch(outcome, every * self.model.opt.timestep, np.stack(chains[1:]))
 
     def _begin(self, keyframe: str, file: str) -> tuple[Array, Array]:
         """Start configuration (a full physics state), and commands ``(nu,)`` that hold it."""
@@ -186,17 +188,14 @@ class MujocoRobot:
         lasts = controller.duration(theta) if isinstance(controller, GaussianPrimitive) else self._longest
         # Noise is drawn even if ``noise`` is 0, so that later draws do not depend on ``noise``.
         shift = self.noise * self._sides * rng.standard_normal(len(self._sides))
-        return self._padded(controller.at(theta, np.minimum(self._times(lasts), lasts)) + shift)
-
-    def _times(self, lasts: float) -> Array:
-        step = self.model.opt.timestep
-        return step * np.arange(np.ceil((lasts + self._settle) / step))
-
-    def _padded(self, moved: Array) -> Array:
-        """Commands of all actuators, from the commands of those that move."""
-        commands = np.tile(self._held, (len(moved), 1))
-        commands[:, self._actuators] = moved
+        commands = self._still(lasts)
+        times = np.minimum(self.model.opt.timestep * np.arange(len(commands)), lasts)
+        commands[:, self._actuators] = controller.at(theta, times) + shift
         return commands
+
+    def _still(self, lasts: float) -> Array:
+        """``(n_steps, nu)``, the commands that hold the start configuration for a movement of ``lasts`` s."""
+        return np.tile(self._held, (int(np.ceil((lasts + self._settle) / self.model.opt.timestep)), 1))
 
     def _simulate(self, contexts: Array, commands: Sequence[Array]) -> list[Array | None]:
         """States of each movement, the first one before its first step; None if the simulation diverged."""
@@ -232,7 +231,7 @@ class MujocoRobot:
         """Set T, ``rest`` and ``outcome_noise``."""
         names = [name for place in self._places for name in place.names]
         self._dim, unit, middle = len(names), self._places[0].unit, (self.contexts.low + self.contexts.high) / 2
-        (still,) = self._simulate(middle[None], [np.tile(self._held, (len(self._times(self._longest)), 1))])
+        (still,) = self._simulate(middle[None], [self._still(self._longest)])
         if still is None:
             raise ValueError(f"{file} diverges even while it holds still; is its timestep too long?")
         rest = self._outcome(still)

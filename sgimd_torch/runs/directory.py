@@ -176,7 +176,7 @@ def _with_earlier(old: dict[str, Any], now: dict[str, Any], notes: list[str]) ->
 
 def sources(config: Config, robot: Environment) -> dict[str, str]:
     """File and checksum of each part that is the user's own code, such as "toss.py, crc32 8f0a1b2c", and of a model."""
-    files = [path.resolve() for path in robot.files] if isinstance(robot, FromFiles) else []
+    files = robot.files if isinstance(robot, FromFiles) else ()
     root = os.path.commonpath([path.parent for path in files]) if files else ""
     found = {f"file {path.relative_to(root)}": f"crc32 {checksum(path)}" for path in files}
     for word in code_of(config.settings):
