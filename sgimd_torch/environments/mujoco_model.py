@@ -144,7 +144,8 @@ def context_box(model: mujoco.MjModel, context: str) -> tuple[Box, list[int]]:
         names.append(name if place.unit == "m" else f"{name} ({place.unit})")
         units.append(place.unit)
         addresses.append(address)
-    return Box(*np.array(sides).reshape(-1, 2).T, tuple(names), "m" if {*units} == {"m"} else ""), addresses
+    lows, highs = np.array(sides).reshape(-1, 2).T
+    return Box(lows, highs, tuple(names), "m" if {*units} == {"m"} else ""), addresses
 
 
 def commands_box(model: mujoco.MjModel, joints: Sequence[str]) -> tuple[Box, list[int], list[str]]:

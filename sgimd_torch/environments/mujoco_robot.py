@@ -58,7 +58,7 @@ class MujocoRobot:
         low, high: corners of T; () for T found by random movements.
         durations: shortest and longest duration of a movement (s).
         n_knots: number of knots of each joint.
-        settle: time (s) from the end of a movement until the outcome is read.
+        settle: time (s) between the end of a movement and its outcome.
         noise: standard deviation of the motor noise, relative to the range of each command. It shifts a command by a
             random amount throughout a movement.
         keyframe: name of the keyframe in which each movement begins; "" for the model's initial positions.
@@ -239,7 +239,7 @@ class MujocoRobot:
             corners = [check_point(name, each, self._dim) for name, each in (("low", low), ("high", high))]
         else:
             corners = self._explored(rest, names, file)
-        self.outcomes = Box(*corners, tuple(names), unit)
+        self.outcomes = Box(corners[0], corners[1], tuple(names), unit)
         self.rest = self.outcomes.clip(np.round(rest, 3))
         self.rest.flags.writeable = False
         self.outcome_noise = 0.0
