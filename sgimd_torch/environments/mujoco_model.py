@@ -196,6 +196,12 @@ def holding(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
     return np.where(model.actuator_ctrllimited, np.clip(held, *model.actuator_ctrlrange.T), held)
 
 
+def positions(model: mujoco.MjModel, actuators: Sequence[int]) -> tuple[str, ...]:
+    """Names of the joints whose positions the commands of ``actuators`` are; () if a command is anything else."""
+    joints = [joint_of(model, k) if _is_servo(model, k) and model.actuator_gear[k, 0] == 1 else None for k in actuators]
+    return () if None in joints else tuple(model.joint(k).name for k in joints)
+
+
 def chain_to(model: mujoco.MjModel, place: Place, actuators: Sequence[int]) -> tuple[list[int], bool]:
     """Bodies from the base of the robot to ``place`` if the robot carries it, else to the last one; and if it does."""
     bodies = {"site": model.site_bodyid, "geom": model.geom_bodyid, "joint": model.jnt_bodyid}.get(place.kind)

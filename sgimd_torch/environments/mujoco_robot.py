@@ -28,6 +28,7 @@ from sgimd_torch.environments.mujoco_model import (
     holding,
     load_model,
     outcome_places,
+    positions,
 )
 from sgimd_torch.environments.protocol import Primitive, SimulationError, Sketch, check_movement, check_robot
 from sgimd_torch.spaces import Array, Box, check_count, check_point, check_rng, stream
@@ -68,6 +69,7 @@ class MujocoRobot:
 
     Attributes:
         files: model file, and files that it includes.
+        joints: names of the joints whose positions the commands are; () if they are anything else, such as torques.
         remarks: sentences for the user, for example about T.
 
     Raises:
@@ -109,6 +111,7 @@ class MujocoRobot:
         if isinstance(self._controller, GaussianPrimitive):
             self.correspondence = self._controller.correspondence
         self.policies, self._sides = self._controller.policies, commands.sides
+        self.joints = positions(self.model, self._actuators)
         self.contexts, self._addresses = context_box(self.model, context)
         self._places = outcome_places(self.model, outcome)
         self._longest, self._settle, self._displacement, self.noise = durations[1], settle, displacement, noise
@@ -118,6 +121,18 @@ class MujocoRobot:
         self._home, self._held = self._begin(keyframe, path.name)
         self._find_spaces(low, high, path.name)
         check_robot(self)
+
+    @property
+    def start(self) -> Array:
+        """``(n_commands,)``, commands that hold the start of a movement."""
+        return self._held[self._actuators]
+
+    @property
+    def hand(self) -> str:
+        """Name of the measured site or body, or of the last body of an arm that does not carry it."""
+        bodies, carried = chain_to(self.model, self._places[0], self._actuators)
+        named = carried and self._places[0].kind in ("site", "body")
+        return self._places[0].name if named else self.model.body(bodies[-1]).name
 
     def observe(self, rng: np.random.Generator) -> Array:
         """``(context_dim,)``, uniform in C."""

@@ -12,6 +12,10 @@ from sgimd_torch.environments.controllers import Sinusoids
 from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import config_of, read_run
+from sgimd_torch.runs.tasks import Task
+from sgimd_torch.teach.leading import Leading
+from sgimd_torch.teach.led import hand_led_of
+from sgimd_torch.teach.lessons import lesson_by_hand, moving
 from sgimd_torch.views.check import main as check
 
 # An arm of two links of .3 m in the plane z = .05, a puck of radius .04 beside it, and a door.
@@ -217,3 +221,18 @@ def test_a_run_needs_no_code_and_tells_which_file_of_the_model_has_changed(here,
     assert "did you mean tip?" in capsys.readouterr().err
     assert command(check, ["mujoco", "--environment.model", "lost.xml"]) == 2
     assert "lost.xml cannot be read or written" in capsys.readouterr().err
+
+
+def test_an_arm_is_led_by_its_tip_to_where_its_movement_then_ends(here):
+    robot = MujocoRobot("arm.xml", outcome="site:tip:xy", context="body:puck:x:-.5:-.4", keyframe="bent", **CORNERS)
+    leading = Leading(hand_led_of(Task(robot)))
+    assert leading.q == pytest.approx([1.0, 0.5], abs=1e-6)
+    leading.grab()
+    leading.begin_recording()
+    for _ in range(60):
+        leading.drag([0.45, 0.2, 0.05])
+        leading.step(0.02)
+    lesson = lesson_by_hand(*moving(*leading.end_recording()), Task(robot), stream(0, "x"))
+    assert lesson.demonstration.outcome == pytest.approx([0.45, 0.2], abs=0.03)
+    pushing = MujocoRobot("arm.xml", outcome="body:puck:xy", **CORNERS)
+    assert hand_led_of(Task(pushing)).hand == "fore"
