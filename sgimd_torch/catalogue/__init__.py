@@ -135,6 +135,7 @@ WORDS: Final[dict[str, dict[str, str]]] = {
         "report": "views.report.command",
         "teach": "teach.command",
         "film": "views.film.command",
+        "ask": "views.ask",
         "demo": "views.demo",
     },
 }
