@@ -116,17 +116,10 @@ class HasPrimitive(Protocol):
 
 @runtime_checkable
 class FromFiles(Protocol):
-    """An environment that is read from files, such as a `MujocoRobot`."""
+    """An environment that is read from files, whose checksums a run keeps; ``remarks`` are sentences for the user."""
 
-    @property
-    def files(self) -> Sequence[Path]:
-        """All files; a run keeps their checksums."""
-        ...
-
-    @property
-    def remarks(self) -> Sequence[str]:
-        """Sentences for the user about choices that the environment made."""
-        ...
+    files: Sequence[Path]
+    remarks: Sequence[str]
 
 
 def primitive_of(environment: Environment) -> Primitive:
