@@ -72,6 +72,8 @@ def load_model(path: Path, joints: Sequence[str]) -> tuple[mujoco.MjModel, list[
     path.open("rb").close()  # MuJoCo's own message of a missing file is no OSError
     try:
         spec = mujoco.MjSpec.from_file(str(path))
+        for mesh in spec.meshes:
+            mesh.file = _of_package(path, mesh.file)
         spec.compiler.fusestatic = False  # else links on fixed joints of a URDF, such as its tool, lose their names
         model = spec.compile()
         if model.nu:
@@ -86,7 +88,7 @@ def load_model(path: Path, joints: Sequence[str]) -> tuple[mujoco.MjModel, list[
 def files_of(path: Path) -> list[Path]:
     """The file of a model, and all files that it includes or refers to, such as meshes."""
     spec, found = mujoco.MjSpec.from_file(str(path)), {path, *map(Path, mujoco.mju_getXMLDependencies(str(path)))}
-    found |= {path.parent / spec.meshdir / each.file for each in spec.meshes if each.file}  # of a URDF
+    found |= {path.parent / spec.meshdir / _of_package(path, each.file) for each in spec.meshes if each.file}
     return sorted({each.resolve() for each in found if each.is_file()})
 
 
@@ -213,6 +215,15 @@ def chain_to(model: mujoco.MjModel, place: Place, actuators: Sequence[int]) -> t
     there = path(place.number if bodies is None else int(bodies[place.number]))
     carried = not driven or bool(driven & {*there})
     return there if carried else max(map(path, driven), key=len), carried
+
+
+def _of_package(path: Path, file: str) -> str:
+    """The place of package://NAME/FILE, a mesh of ROS, in the folder NAME or beside it; other files unchanged."""
+    head, _, rest = file.removeprefix("package://").partition("/")
+    if not file.startswith("package://"):
+        return file
+    places = [folder / name for folder in path.resolve().parents for name in (f"{head}/{rest}", rest)]
+    return str(next((place for place in places if place.is_file()), rest))
 
 
 def _names(model: mujoco.MjModel, kind: str) -> list[str]:

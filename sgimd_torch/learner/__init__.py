@@ -291,13 +291,8 @@ class Learner:
         self._publish(Event(Kind.SHOWN, lesson=demonstration, who=who, place=place))
 
     def add(self, context: ArrayLike, theta: ArrayLike, outcome: ArrayLike) -> None:
-        """Remember a movement that this learner has not proposed, such as one by another program. It enters the
-        memory and the life of the learner, but does not count as a movement.
-
-        Args:
-            context: ``(context_dim,)``.
-            theta: ``(theta_dim,)`` in Pi.
-            outcome: ``(outcome_dim,)``.
+        """Remember a movement that this learner has not proposed, such as one by another program: its ``context``
+        ``(context_dim,)``, ``theta`` in Pi, and ``outcome`` ``(outcome_dim,)``. It does not count as a movement.
 
         Raises:
             RuntimeError: the outcome of the last movement was not told.

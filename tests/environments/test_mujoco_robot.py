@@ -116,6 +116,14 @@ def test_servos_are_made_for_a_urdf_and_hold_the_arm_against_gravity(here):
     assert robot.outcomes.axis(0) == "shoulder (rad)"
 
 
+def test_meshes_of_a_ros_package_are_found_from_its_folder_on(here):
+    (here / "urdf").mkdir()
+    mesh = '<collision><geometry><mesh filename="package://arm/tooth.obj"/></geometry></collision>'
+    (here / "urdf/toothed.urdf").write_text(URDF.replace('<link name="fore">', f'<link name="fore">{mesh}'))
+    robot = MujocoRobot("urdf/toothed.urdf", outcome="body:tool:xz", **CORNERS)
+    assert [path.name for path in robot.files] == ["tooth.obj", "toothed.urdf"]
+
+
 def test_an_object_begins_where_its_context_says_and_stays_there_if_missed(here):
     place = "body:puck:x:.3:.5,body:puck:y:-.4:.4,joint:hinge:-1:1"
     robot = MujocoRobot("arm.xml", outcome="body:puck:xy,body:door:x", context=place, low=(-1, -1, -2), high=(1, 1, 1))
