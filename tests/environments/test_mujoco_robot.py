@@ -8,6 +8,7 @@ import pytest
 
 from runs import about_of
 from sgimd_torch import MujocoRobot, SimulationError, check_environment, stream
+from sgimd_torch.demonstrations.units import moving
 from sgimd_torch.environments.controllers import Sinusoids
 from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.process import command
@@ -15,7 +16,7 @@ from sgimd_torch.runs.read import config_of, read_run
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.teach.leading import Leading
 from sgimd_torch.teach.led import hand_led_of
-from sgimd_torch.teach.lessons import lesson_by_hand, moving
+from sgimd_torch.teach.lessons import lesson_by_hand
 from sgimd_torch.views.check import main as check
 
 # An arm of two links of .3 m in the plane z = .05, a puck of radius .04 beside it, and a door.
