@@ -11,6 +11,7 @@ from .demonstrations import save_demonstrations as save_demonstrations
 from .environments.check import check_environment as check_environment
 from .environments.fishing_rod import FishingRod as FishingRod
 from .environments.motor_primitives import GaussianPrimitive as GaussianPrimitive
+from .environments.mujoco_robot import MujocoRobot as MujocoRobot
 from .environments.planar_arm import PlanarArm as PlanarArm
 from .environments.protocol import Environment as Environment
 from .environments.protocol import SimulationError as SimulationError
@@ -35,6 +36,7 @@ from .parts import Search as Search
 from .parts import Teacher as Teacher
 from .record.lives import load_life as load_life
 from .record.lives import save_life as save_life
+from .runs.load import load_learner as load_learner
 from .searches.perturb import Perturb as Perturb
 from .searches.simplex import NelderMead as NelderMead
 from .session import run as run

@@ -58,6 +58,7 @@ WORDS: Final[dict[str, dict[str, str]]] = {
         "spatial-arm": "runs.tasks.robots:spatial_arm",
         "puck": "runs.tasks.robots:puck",
         "fetch": "runs.tasks.robots:fetch",
+        "mujoco": "environments.mujoco_robot:MujocoRobot",
     },
     "goals": {
         "interest-map": "goals.interest_map:InterestMap",
@@ -134,6 +135,7 @@ WORDS: Final[dict[str, dict[str, str]]] = {
         "report": "views.report.command",
         "teach": "teach.command",
         "film": "views.film.command",
+        "ask": "views.ask",
         "demo": "views.demo",
     },
 }
@@ -166,6 +168,8 @@ def place_of(kind: str, word: str) -> str:
     if ":" not in word:
         module, dot, name = word.rpartition(".")
         meant = f"is it {module}:{name}?" if dot else "or, for code of your own, package.module:attribute"
+        if name in ("xml", "urdf"):
+            meant = f"for a model file write --environment mujoco --environment.model {word}: docs/how-to/mujoco.md"
         raise unknown(kind, word, WORDS[kind], f"; {meant}")
     return word
 

@@ -26,6 +26,7 @@ _NAMES: Final[dict[Any, str]] = {  # of types, in help and in errors
     bool: "true or false",
     Path: "a path",
     types.NoneType: "null",
+    tuple[float, ...]: "numbers with commas",
     tuple[float, float]: "two numbers with a comma between",
     tuple[int, ...]: "whole numbers with commas",
     tuple[str, ...]: "names with commas",

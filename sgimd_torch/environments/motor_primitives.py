@@ -8,42 +8,45 @@ trajectory is translated to the theta that reproduces it most closely (eq. 6).
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from sgimd_torch.environments.protocol import Primitive, check_recording
-from sgimd_torch.spaces import Array, Box
-
-KNOTS: Final = 4  # number of knots per joint
+from sgimd_torch.spaces import Array, Box, check_count
 
 
 class GaussianPrimitive(Primitive):
     """Joint trajectories by Gaussian distance weighting of knots, eq. (5).
 
-    theta in [0, 1]^(4 n_joints + 1) holds the knots joint by joint, scaled to the joint ranges, then the duration.
+    theta in [0, 1]^(n_knots n_joints + 1) holds the knots joint by joint, scaled to the ranges of the joints, then the
+    duration.
 
     Args:
         joints: ``(n_joints,)`` box of joint ranges (rad).
         durations: shortest and longest duration delta (s), above 0.
-        sharpness: factor s in sigma = s / delta^2. A factor below 5 makes the fit of eq. (6) ill-conditioned, a factor
-            above 12 makes movements jerky.
+        sharpness: factor s in sigma = s / delta^2 of four knots; of more knots sigma is larger, so that neighbours
+            overlap alike. A factor below 5 makes the fit of eq. (6) ill-conditioned, a factor above 12 makes movements
+            jerky.
+        n_knots: number of knots of each joint, at least 2.
 
     Raises:
-        ValueError: the durations do not satisfy 0 < shortest < longest, or the sharpness is not above 0.
+        ValueError: the durations do not satisfy 0 < shortest < longest, the sharpness is not above 0, or there are
+            fewer than 2 knots.
     """
 
-    def __init__(self, joints: Box, durations: tuple[float, float], *, sharpness: float = 9.0) -> None:
+    def __init__(
+        self, joints: Box, durations: tuple[float, float], *, sharpness: float = 9.0, n_knots: int = 4
+    ) -> None:
         if not 0 < durations[0] < durations[1]:
             raise ValueError(f"durations must be 0 < shortest < longest in seconds, got {durations}")
         if not sharpness > 0:
             raise ValueError(f"sharpness must be above 0, got {sharpness}")
         self.joints = self.ranges = joints
         self.durations = durations
-        self.sharpness = sharpness
-        self.policies = Box.cube(0.0, 1.0, joints.dim * KNOTS + 1)
-        self._centres = np.arange(KNOTS) / (KNOTS - 1)  # times of the knots, as shares of the duration
+        self.n_knots = check_count("n_knots", n_knots, 2)
+        self.sharpness = sharpness * ((n_knots - 1) / 3) ** 2
+        self.policies = Box.cube(0.0, 1.0, joints.dim * n_knots + 1)
+        self._centres = np.arange(n_knots) / (n_knots - 1)  # times of the knots, as shares of the duration
 
     def duration(self, theta: Array) -> float:
         """delta (s) of one ``(theta_dim,)`` theta."""
@@ -94,7 +97,7 @@ class GaussianPrimitive(Primitive):
         problem, which is solved by the paper's algorithm (trust-region reflective).
 
         Args:
-            times: ``(n_times,)`` s, increasing, at least 4 of them.
+            times: ``(n_times,)`` s, increasing, at least ``n_knots`` of them.
             trajectory: ``(n_times, n_joints)`` rad.
 
         Returns:
@@ -107,7 +110,7 @@ class GaussianPrimitive(Primitive):
         from scipy.optimize import lsq_linear  # only here, because this import takes longer than all of sgimd_torch
 
         times, trajectory = check_recording(
-            times, trajectory, self.joints.dim, samples=KNOTS, longest=self.durations[1]
+            times, trajectory, self.joints.dim, samples=self.n_knots, longest=self.durations[1]
         )
         span = times[-1] - times[0]
         weights = self._weights((times - times[0]) / span)
@@ -122,7 +125,7 @@ class GaussianPrimitive(Primitive):
         return self.policies.clip(np.append(knots.T.ravel(), pace))
 
     def _knots(self, theta: Array) -> Array:
-        knots = theta[:-1].reshape(self.joints.dim, KNOTS)
+        knots = theta[:-1].reshape(self.joints.dim, self.n_knots)
         return self.joints.low[:, None] + knots * self.joints.sides[:, None]
 
     def _weights(self, phases: Array) -> Array:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Final, Protocol, runtime_checkable
 
 import numpy as np
@@ -111,6 +112,14 @@ class HasPrimitive(Protocol):
     def primitive(self) -> Primitive:
         """Primitive of this robot."""
         ...
+
+
+@runtime_checkable
+class FromFiles(Protocol):
+    """An environment that is read from files, whose checksums a run keeps; ``remarks`` are sentences for the user."""
+
+    files: Sequence[Path]
+    remarks: Sequence[str]
 
 
 def primitive_of(environment: Environment) -> Primitive:

@@ -290,6 +290,23 @@ class Learner:
             here.begin(self.social.attempt(context, theta_d, demonstration), context)
         self._publish(Event(Kind.SHOWN, lesson=demonstration, who=who, place=place))
 
+    def add(self, context: ArrayLike, theta: ArrayLike, outcome: ArrayLike) -> None:
+        """Remember a movement that this learner has not proposed, such as one by another program: its ``context``
+        ``(context_dim,)``, ``theta`` in Pi, and ``outcome`` ``(outcome_dim,)``. It does not count as a movement.
+
+        Raises:
+            RuntimeError: the outcome of the last movement was not told.
+            ValueError: a vector has another shape or is not finite, or theta lies outside Pi; nothing is remembered.
+        """
+        if self._asked:
+            raise RuntimeError("add() needs the outcome of the last movement first; was tell() forgotten?")
+        context = read_only(check_point("context", context, self.memory.context_dim))
+        theta = read_only(self.problem.policies.check("theta", check_point("theta", theta, self.memory.theta_dim)))
+        outcome = read_only(self.memory.check_outcome(theta, outcome))
+        self._report_new()
+        self.memory.add(context, theta, outcome)
+        self._publish(Event(Kind.ADDED, context, theta, outcome=outcome))
+
     def translate(self, demonstration: Demonstration) -> Array:
         """theta_d, eq. (6): the policy that corresponds to a demonstration.
 

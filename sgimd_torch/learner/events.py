@@ -18,6 +18,7 @@ class Kind(StrEnum):
     RESTED = "rested"
     SHOWN = "shown"
     ASKED = "asked"  # request; ``reply`` is its result, and after "shown" the next event is the demonstration
+    ADDED = "added"  # exemplar of a movement that the learner has not proposed
     FAILED = "failed"  # movement without an outcome, for the reason ``reply``; if theta is None, no context was seen
     INTERRUPTED = "interrupted"  # interruption by the caller, before an outcome was told; place -1: between movements
 

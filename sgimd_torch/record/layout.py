@@ -30,7 +30,7 @@ class ReplayError(RuntimeError):
 
 
 _COUNTED: Final = (Kind.MOVED, Kind.RESTED, Kind.FAILED)  # events that count as movements
-_IN_CONTEXT: Final = (*_COUNTED, Kind.ASKED, Kind.INTERRUPTED)  # events with a context
+_IN_CONTEXT: Final = (*_COUNTED, Kind.ASKED, Kind.ADDED, Kind.INTERRUPTED)  # events with a context
 
 
 def layout(dims: Dims) -> dict[str, list[str]]:

@@ -66,4 +66,4 @@ def load_life(
             if after is not None:
                 after(episode.move)
     if exemplars not in (None, len(learner.memory)):
-        raise ReplayError(f"{path} ended with another memory; were exemplars added by hand?")
+        raise ReplayError(f"{path} ended with another memory; were exemplars added without learner.add()?")

@@ -20,6 +20,7 @@ from sgimd_torch.record.layout import ReplayError
 from sgimd_torch.spaces import Array, Box, Demonstration, Episode, Failure, Move, Request
 
 _HINT: Final = "was it recorded by another version, on another processor or with another configuration?"
+_ALONE: Final = (Kind.SHOWN, Kind.ASKED, Kind.ADDED)  # events that are never grouped with others
 _ROUNDED: Final = (
     "movement {} was recorded with a theta that differs by rounding: another version or processor made the record. The "
     "learner remembers the recorded theta"
@@ -55,7 +56,7 @@ def replay(
         event, index = group[0], learner.movements
         last = index + group[-1].place
         # Between two runs the caller may show something, or begin or end an attempt; then no teacher is asked.
-        between = event.place < 0 or (event.kind in (Kind.SHOWN, Kind.ASKED) and event.who is None)
+        between = event.place < 0 or (event.kind in _ALONE and event.who is None)
         if teacher is not None and not between:
             offered |= {k: teacher.offer(k, learner.memory) for k in range(max(asked_until, index), last + 1)}
             asked_until = max(asked_until, last + 1)
@@ -79,6 +80,11 @@ def replay(
                     before[event.place] = _of(before, event)._replace(request=request, reply=event.reply or "")
                     if event.reply != "shown":
                         learner.go_on_alone(event.reply or "", place=event.place)
+            case Kind.ADDED:
+                assert event.context is not None
+                assert event.theta is not None
+                assert event.outcome is not None
+                learner.add(event.context, event.theta, event.outcome)
             case Kind.INTERRUPTED if between:
                 learner.interrupt()
                 asked_until = index  # when the run was resumed, its teacher was asked again
@@ -117,7 +123,7 @@ def _together(events: Iterable[Event]) -> Iterator[list[Event]]:
     """Groups of events: movements that were made at once, by place of the robot; every other event is alone."""
     group: list[Event] = []
     for event in events:
-        moved = event.kind not in (Kind.SHOWN, Kind.ASKED) and event.place >= 0
+        moved = event.kind not in _ALONE and event.place >= 0
         same = group and (event.kind == Kind.INTERRUPTED) == (group[-1].kind == Kind.INTERRUPTED)
         if group and not (moved and same and event.place > group[-1].place):
             yield group

@@ -1,7 +1,6 @@
 """Run one learner, evaluate it now and then, and write everything into one folder, such as OUT/NAME/seed-003.
 
 Examples:
-  sgimd run --algorithm sgim-d --seed 3
   sgimd run --algorithm sgim-d --seed 3 --resume              go on after Ctrl-C, or with more --movements
   sgimd run --algorithm sagg-riac --goals grid --goals.window 12 --name grid --movements 2000
   sgimd run --environment mypackage.toss:make                 a run on your own robot

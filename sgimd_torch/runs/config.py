@@ -16,7 +16,7 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, Final, NamedTuple, Self
 
-from sgimd_torch.catalogue import PLACES, ROD, TAUGHT_BY, did_you_mean, load_word, place_of, word_of
+from sgimd_torch.catalogue import PLACES, ROD, TAUGHT_BY, WORDS, did_you_mean, load_word, place_of, word_of
 from sgimd_torch.catalogue.options import Option, choices_of, options_of
 
 OWN: Final = "own"  # name of the run's own inverse model
@@ -291,8 +291,8 @@ def chosen(given: Mapping[str, Any]) -> dict[str, Part]:
 
 def code_of(settings: Mapping[str, Any]) -> list[str]:
     """Places ``package.module:attribute`` in ``settings`` that are a user's own code."""
-    values = [value for name, value in settings.items() if name not in (*PLACE, *FILES)]
-    words = [word for value in values for word in (value if isinstance(value, list) else [value])]
+    chosen = [value for name, value in settings.items() if name.rpartition(".")[2] in (*WORDS, "evaluated_by")]
+    words = [word for value in chosen for word in (value if isinstance(value, list) else [value])]
     return sorted({w for w in words if isinstance(w, str) and ":" in w and w not in PLACES})
 
 

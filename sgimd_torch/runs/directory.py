@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import sgimd_torch
+from sgimd_torch.environments.protocol import Environment, FromFiles
 from sgimd_torch.files import checksum, make_folder
 from sgimd_torch.record import Dims, Record, RunError
 from sgimd_torch.runs.build import RunParts
@@ -49,7 +50,7 @@ def open_run(parts: RunParts, *, resume: bool, accept_loss: bool = False) -> tup
     about: dict[str, Any] = {
         "settings": config.settings,
         "files": parts.data,
-        "versions": {**versions(forward=bool(parts.learner.problem.trained)), **sources(config)},
+        "versions": {**versions(forward=bool(parts.learner.problem.trained)), **sources(config, robot)},
         "robot": type(robot).__name__,
         "words": words(config),
         "spaces": {n: [b.low.tolist(), b.high.tolist(), b.names, b.unit] for n, b in spaces.items()},
@@ -173,9 +174,11 @@ def _with_earlier(old: dict[str, Any], now: dict[str, Any], notes: list[str]) ->
     return {**now, "before": earlier} if earlier else now
 
 
-def sources(config: Config) -> dict[str, str]:
-    """File and checksum of each part that is the user's own code, such as "toss.py, crc32 8f0a1b2c"."""
-    found = {}
+def sources(config: Config, robot: Environment) -> dict[str, str]:
+    """File and checksum of each part that is the user's own code, such as "toss.py, crc32 8f0a1b2c", and of a model."""
+    files = robot.files if isinstance(robot, FromFiles) else ()
+    root = os.path.commonpath([path.parent for path in files]) if files else ""
+    found = {f"file {path.relative_to(root)}": f"crc32 {checksum(path)}" for path in files}
     for word in code_of(config.settings):
         spec = importlib.util.find_spec(word.partition(":")[0])
         if spec is not None and spec.has_location and spec.origin:

@@ -1,7 +1,7 @@
 """Robots that a person can lead by the hand: a MuJoCo model, the led joints of the model, and their limits.
 
     led = hand_led_of(task); led.joints
-The arm and the rod are known here. A robot of your own needs an attribute ``hand_led``.
+The arm, the rod and robots from model files are known here. A robot of your own needs an attribute ``hand_led``.
 """
 
 from __future__ import annotations
@@ -14,6 +14,8 @@ import mujoco
 import numpy as np
 
 from sgimd_torch.environments.fishing_rod import JOINT_RANGES, JOINTS, FishingRod
+from sgimd_torch.environments.motor_primitives import GaussianPrimitive
+from sgimd_torch.environments.mujoco_robot import MujocoRobot
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.runs.tasks.taught import correspondence_of
@@ -68,6 +70,9 @@ def hand_led_of(task: Task) -> HandLed:
         led = rod_led(robot)
     elif isinstance(robot, PlanarArm):
         led = arm_led(robot)
+    elif isinstance(robot, MujocoRobot) and isinstance(robot.primitive, GaussianPrimitive) and robot.joints:
+        fastest = robot.primitive.fastest()
+        led = HandLed(robot.model, robot.joints, robot.hand, robot.primitive.joints, robot.start, *fastest)
     else:
         raise ValueError(
             f"{type(robot).__name__} cannot be led by the hand: it does not say which joints of which model a hand "

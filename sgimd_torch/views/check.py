@@ -19,6 +19,7 @@ corners of Pi:
 Examples:
   sgimd check mypackage.toss:make
   sgimd check fishing-rod --movements 20
+  sgimd check mujoco --environment.model arm.xml --environment.outcome site:tip      options, as of sgimd run
 
 Exit code: 0 the environment keeps every rule, 2 it does not.
 """
@@ -33,7 +34,7 @@ import numpy as np
 from sgimd_torch.environments.check import check_environment
 from sgimd_torch.environments.protocol import Environment, execute_many
 from sgimd_torch.runs.build import task_of
-from sgimd_torch.runs.config import Config
+from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.process import parser_of
 from sgimd_torch.runs.tasks import Task, benchmark_of
 from sgimd_torch.runs.tasks.taught import demonstrations_of
@@ -58,9 +59,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     Raises:
         ValueError: there is no such environment, or it violates a rule.
     """
-    options = parser().parse_args(argv)
+    options, of_environment = parser().parse_known_args(argv)
     check_count("--movements", options.movements, 1)
-    config = Config(parts={"environment": options.environment})
+    config, _ = parse([f"--environment={options.environment}", *of_environment])
     try:
         task = task_of(config)
     except (ValueError, OSError):

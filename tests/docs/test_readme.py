@@ -3,6 +3,7 @@
 A block of a page says in its first line what is done with it:
     ```python              runs, in the folder of its page, with names of its own
     ```python toss.py      is saved there under that name
+    ```xml arm.xml         is saved there, too
     ```sh                  commands, carried out line by line
     ```                    commands that take too long: those of sgimd are read, up to where the work would begin
     ```text                is looked at only
@@ -35,7 +36,10 @@ HOW_TO = tuple(
 )
 OTHERS = (  # each in a folder of its own
     "docs/runs.md",
-    *(f"docs/how-to/{name}.md" for name in ("ablations", "gymnasium", "real-robot", "resuming", "several-robots")),
+    *(
+        f"docs/how-to/{name}.md"
+        for name in ("ablations", "gymnasium", "mujoco", "real-robot", "resuming", "several-robots")
+    ),
     *(f"docs/explained/{name}.md" for name in ("random-numbers", "noise")),
     pytest.param("docs/tutorial.md", marks=pytest.mark.slow),  # the rod's physics
     pytest.param("docs/how-to/forward-model.md", marks=pytest.mark.slow),  # torch
@@ -132,7 +136,7 @@ def test_a_page_works_from_top_to_bottom(page, folder):
 
 def work_through(page):
     names = {"__name__": "__main__"}
-    for block in blocks(page, "python", "sh"):
+    for block in blocks(page, "python", "sh", "xml"):
         for long, short in SMALLER.items():
             block = block._replace(text=block.text.replace(long, short))
         block.carry_out(names)

@@ -69,13 +69,15 @@ def act(learner, what, k, place=0):
             learner.social or learner._places[place].request
         ):
             learner.watch(LESSONS[k], who=what, place=place)
+        case "add" if not waits_for_outcome:
+            learner.add(context, np.full(3, 0.2 * k), np.array([0.3, 0.1 * k]))
         case "fail":
             learner.fail("lost")
         case "interrupt":
             learner.interrupt()
 
 
-WHATS = ["move", "ask", "tell", "request", "alone", "teacher", "by-hand", None, "fail", "interrupt"]
+WHATS = ["move", "ask", "tell", "request", "alone", "teacher", "by-hand", None, "add", "fail", "interrupt"]
 CHOICES = st.integers(0, len(LESSONS) - 1)
 ALONE = st.tuples(st.sampled_from([*["move"] * 5, *WHATS]), CHOICES)
 TOGETHER = st.tuples(st.sampled_from([*["ask many", "tell"] * 5, "ask some", *WHATS]), CHOICES, st.integers(0, 2))
@@ -231,3 +233,23 @@ def test_a_record_that_ends_at_any_movement_goes_on_to_the_same_rows(tmp_path):
     for movement in range(60):
         kept = [event for event, row in zip(events, whole, strict=True) if row[0] < movement]
         assert lived(tmp_path / str(movement), 60, kept)[0] == whole
+
+
+def test_a_movement_made_elsewhere_enters_memory_and_record_but_counts_as_none(tmp_path):
+    learner, told = sgim_d(ARM, 0, **TAUGHT), []
+    learner.listeners.append(told.append)
+    learner.add(CONTEXTS[0], [0.5, 0.5, 0.5], [0.9, 0.1])
+    assert (len(learner.memory), learner.movements, [each.kind for each in told]) == (1, 0, [Kind.ADDED])
+    with pytest.raises(ValueError, match="theta must lie in its box"):
+        learner.add(CONTEXTS[0], [0.5, 0.5, 1.5], [0.9, 0.1])
+    with pytest.raises(ValueError, match="outcome"):
+        learner.add(CONTEXTS[0], [0.5, 0.5, 0.5], [0.9, np.nan])
+    learner.ask(CONTEXTS[0])
+    with pytest.raises(RuntimeError, match="was tell\\(\\) forgotten"):
+        learner.add(CONTEXTS[0], [0.5, 0.5, 0.5], [0.9, 0.1])
+    assert len(learner.memory) == 1
+    save_life(learner, tmp_path / "life.sqlite")
+    again = sgim_d(ARM, 0, **TAUGHT)
+    load_life(again, tmp_path / "life.sqlite")
+    np.testing.assert_array_equal(again.memory.outcomes, [[0.9, 0.1]])
+    assert again.ask(CONTEXTS[0]).theta.tolist() == learner._asked[0][1].theta.tolist()

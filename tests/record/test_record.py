@@ -68,6 +68,7 @@ def test_events_of_every_kind_come_back(tmp_path):
         Event(Kind.ASKED, context, goal=goal, who="all", strategy="imitate all", reply="again"),
         Event(Kind.INTERRUPTED, context, theta),
         Event(Kind.INTERRUPTED),
+        Event(Kind.ADDED, context, theta, outcome=goal),
         Event(Kind.FAILED, context, theta, goal, origin="local", reply="lost"),
         Event(Kind.FAILED, reply="no camera"),
     ]
@@ -77,7 +78,7 @@ def test_events_of_every_kind_come_back(tmp_path):
             record.add(event)
         record.commit()
         assert all(same(*pair) for pair in zip(record.events(), events, strict=True))
-    assert [row[0] for row in read(tmp_path / "run.sqlite")["events"]] == [0, 1, 2, 2, 2, 2, 2, 2, 2, 3]
+    assert [row[0] for row in read(tmp_path / "run.sqlite")["events"]] == [0, 1, 2, 2, 2, 2, 2, 2, 2, 2, 3]
 
 
 def test_a_demonstration_is_kept_once_also_when_it_is_shown_again_after_a_break(tmp_path):

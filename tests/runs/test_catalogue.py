@@ -232,6 +232,7 @@ def test_a_word_that_is_no_word_says_what_would_have_been_right(toss):
     for kind, word, meant in (
         ("goals", "toss", "or, for code of your own, package.module:attribute"),
         ("environment", "toss.Toss", "is it toss:Toss?"),
+        ("environment", "arm.xml", "for a model file write --environment mujoco --environment.model arm.xml"),
         ("environment", "planar-arm", "did you mean planar-arm-7?"),
     ):
         with pytest.raises(ValueError, match=re.escape(meant)):

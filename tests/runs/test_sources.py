@@ -7,6 +7,7 @@ import sys
 import pytest
 
 from runs import ROOT, about_of, content_of
+from sgimd_torch import PlanarArm
 from sgimd_torch.files import checksum
 from sgimd_torch.runs.command_line import main, parse
 from sgimd_torch.runs.config import Config
@@ -45,7 +46,7 @@ def test_the_file_of_every_part_of_ones_own_is_kept_and_told_when_it_has_changed
     before = about_of(own / "runs/random/seed-000")["versions"]["before"]
     assert [each["source of sliders:Slider"] for each in before] == [kept]
     sys.modules.pop("answers")
-    assert sources(Config()) == {}
+    assert sources(Config(), PlanarArm()) == {}
 
 
 def test_a_robot_that_has_become_another_one_is_refused(own, capsys):

@@ -14,7 +14,7 @@ from typing import Final, Protocol, runtime_checkable
 
 import numpy as np
 
-from sgimd_torch.environments.protocol import Environment, Trace, Tracer, check_instance, traced
+from sgimd_torch.environments.protocol import Environment, FromFiles, Trace, Tracer, check_instance, traced
 from sgimd_torch.evaluation import Benchmark, load_benchmark
 from sgimd_torch.files import checksum
 from sgimd_torch.learner import Correspondence
@@ -76,7 +76,7 @@ def goals_all_over(environment: Environment) -> Benchmark:
 
 
 def benchmark_of(task: Task, file: Path | None) -> tuple[Benchmark, list[str], str | None]:
-    """Goals of evaluation, messages about them, and the checksum of their file (None: no file).
+    """Goals of evaluation, messages about the robot and its goals, and the checksum of their file (None: no file).
 
     Args:
         task: task of the run.
@@ -86,7 +86,8 @@ def benchmark_of(task: Task, file: Path | None) -> tuple[Benchmark, list[str], s
         ValueError: the goals do not fit the environment, or the file is damaged.
         OSError: there is no such file.
     """
-    source, robot, notes, crc32 = file or task.benchmark, task.environment, list[str](), None
+    source, robot, crc32 = file or task.benchmark, task.environment, None
+    notes = [*robot.remarks] if isinstance(robot, FromFiles) else []
     if isinstance(source, Path):
         crc32 = checksum(source)
         benchmark = load_benchmark(source)

@@ -1,0 +1,297 @@
+"""A robot from its model file: commands over time, simulated by MuJoCo, and the place of something at the end.
+
+    robot = MujocoRobot("arm.xml", outcome="site:tip"); outcome = robot.execute(robot.observe(rng), theta, rng)
+A movement is open loop: all commands are known before it begins. So MuJoCo simulates many movements in parallel,
+outside Python. ``mujoco_model.py`` reads the model and finds what is named in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Final
+
+import mujoco
+import numpy as np
+from mujoco import rollout
+from numpy.typing import ArrayLike
+
+from sgimd_torch.catalogue import unknown
+from sgimd_torch.environments.controllers import Controller
+from sgimd_torch.environments.motor_primitives import GaussianPrimitive
+from sgimd_torch.environments.mujoco_model import (
+    chain_to,
+    commands_box,
+    context_box,
+    files_of,
+    holding,
+    load_model,
+    outcome_places,
+    positions,
+)
+from sgimd_torch.environments.protocol import Primitive, SimulationError, Sketch, check_movement, check_robot
+from sgimd_torch.spaces import Array, Box, check_count, check_point, check_rng, stream
+
+EXPLORED: Final = 300  # number of random movements that find T
+REPEATED: Final = 30  # number of random movements that are executed twice to find the noise of outcomes
+MOVED: Final = 1e-3  # m or rad, shift of the measured place that counts as moved
+FEWEST: Final = 10  # number of random movements that must move the measured place
+_BLOCK: Final = 32  # number of movements simulated in parallel
+_STATE: Final = mujoco.mjtState.mjSTATE_FULLPHYSICS
+_FRAMES: Final = 25.0  # drawings of a movement per second
+
+
+class MujocoRobot:
+    """Robot from an MJCF or URDF file, simulated by MuJoCo.
+
+    T, if it is not given, is found by random movements; ``remarks`` says so. Only one Python thread at a time may use
+    a robot. When a simulation diverges, MuJoCo adds a line to ``MUJOCO_LOG.TXT`` in the current directory.
+
+    Args:
+        model: path of the MJCF or URDF file.
+        outcome: comma-separated places at the end of a movement, such as site:tip, body:cup:xy, geom:ball:xz or
+            joint:door.
+        joints: joints that move; () for all with an actuator. Other actuators hold their initial positions.
+        context: comma-separated initial positions of objects, body:NAME:AXIS:LOW:HIGH for a body with a free joint,
+            joint:NAME:LOW:HIGH for a hinge or slide; "" for no context.
+        displacement: whether an outcome is the shift of the place from where the movement began.
+        low, high: corners of T; () for T found by random movements.
+        durations: shortest and longest duration of a movement (s).
+        n_knots: number of knots of each joint.
+        settle: time (s) between the end of a movement and its outcome.
+        noise: standard deviation of the motor noise, relative to the range of each command. It shifts a command by a
+            random amount throughout a movement.
+        keyframe: name of the keyframe in which each movement begins; "" for the model's initial positions.
+        threads: number of threads of an evaluation; results do not depend on this number.
+        controller: function (box of commands) -> controller, such as ``partial(Sinusoids, frequencies=(0.2, 2))``;
+            None for a `GaussianPrimitive`.
+
+    Attributes:
+        files: model file, and files that it includes.
+        joints: names of the joints whose positions the commands are; () if they are anything else, such as torques.
+        remarks: sentences for the user, for example about T.
+
+    Raises:
+        ValueError: a name is not in the model, a number is out of its range, or the model cannot be used.
+        OSError: there is no such file.
+    """
+
+    def __init__(
+        self,
+        model: str | Path = "",
+        *,
+        outcome: str = "",
+        joints: tuple[str, ...] = (),
+        context: str = "",
+        displacement: bool = False,
+        low: tuple[float, ...] = (),
+        high: tuple[float, ...] = (),
+        durations: tuple[float, float] = (0.5, 1.5),
+        n_knots: int = 4,
+        settle: float = 0.5,
+        noise: float = 0.0,
+        keyframe: str = "",
+        threads: int = 1,
+        controller: Callable[[Box], Controller] | None = None,
+    ) -> None:
+        if model == "":
+            raise ValueError("model is missing: the path of an MJCF or URDF file, such as arm.xml")
+        for name, value in (("settle", settle), ("noise", noise)):
+            if not 0 <= value < np.inf:
+                raise ValueError(f"{name} must be finite and >= 0, got {value}")
+        path = Path(model)
+        self.model, self.remarks = load_model(path, joints)
+        self.files = files_of(path)
+        commands, self._actuators, said = commands_box(self.model, joints)
+        self.remarks += said
+        make = controller or partial(GaussianPrimitive, durations=durations, n_knots=check_count("n_knots", n_knots, 2))
+        self._controller = make(commands)
+        self.primitive = self._controller if isinstance(self._controller, Primitive) else Primitive()
+        if isinstance(self._controller, GaussianPrimitive):
+            self.correspondence = self._controller.correspondence
+        self.policies, self._sides = self._controller.policies, commands.sides
+        self.joints = positions(self.model, self._actuators)
+        self.contexts, self._addresses = context_box(self.model, context)
+        self._places = outcome_places(self.model, outcome)
+        self._longest, self._settle, self._displacement, self.noise = durations[1], settle, displacement, noise
+        threads = check_count("threads", threads, 1)
+        self._pool = rollout.Rollout(nthread=threads if threads > 1 else 0)
+        self._data = [mujoco.MjData(self.model) for _ in range(threads)]
+        self._home, self._held = self._begin(keyframe, path.name)
+        self._find_spaces(low, high, path.name)
+        check_robot(self)
+
+    @property
+    def start(self) -> Array:
+        """``(n_commands,)``, commands that hold the start of a movement."""
+        return self._held[self._actuators]
+
+    @property
+    def hand(self) -> str:
+        """Name of the measured site or body, or of the last body of an arm that does not carry it."""
+        bodies, carried = chain_to(self.model, self._places[0], self._actuators)
+        named = carried and self._places[0].kind in ("site", "body")
+        return self._places[0].name if named else self.model.body(bodies[-1]).name
+
+    def observe(self, rng: np.random.Generator) -> Array:
+        """``(context_dim,)``, uniform in C."""
+        return self.contexts.sample(rng)
+
+    def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
+        """``(outcome_dim,)``, the outcome of one movement.
+
+        Raises:
+            ValueError: ``context`` is not one point of C, or ``theta`` is not one point of Pi.
+            TypeError: ``rng`` is not a Generator.
+            SimulationError: the simulation diverged; the message names theta.
+        """
+        context, theta = check_movement(self, context, theta)
+        outcome = self.execute_many(context[None], theta[None], [rng])[0]
+        if np.isnan(outcome).any():
+            raise SimulationError(f"the simulation diverged in context {context.tolist()}", theta)
+        return outcome
+
+    def execute_many(self, contexts: Array, thetas: Array, rngs: Sequence[np.random.Generator]) -> Array:
+        """``(n, outcome_dim)``, outcomes, NaN if a simulation diverged; row i equals ``execute`` for row i."""
+        commands = [self._commands(theta, rng) for theta, rng in zip(thetas, rngs, strict=True)]
+        outcomes = np.empty((len(thetas), self._dim))
+        for start in range(0, len(thetas), _BLOCK):
+            rows = slice(start, start + _BLOCK)
+            outcomes[rows] = [self._outcome(states) for states in self._simulate(contexts[rows], commands[rows])]
+        return outcomes
+
+    def trace(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Sketch:
+        """Drawings of a movement: the bodies of the arm, in the plane of the first two dimensions of an outcome."""
+        context, theta = check_movement(self, context, theta)
+        (states,) = self._simulate(context[None], [self._commands(theta, rng)])
+        if states is None:
+            raise SimulationError(f"the simulation diverged in context {context.tolist()}", theta)
+        every = max(1, round(1 / (_FRAMES * self.model.opt.timestep)))
+        place, data, outcome, chains = self._places[0], self._data[0], self._outcome(states), list[Array]()
+        bodies, carried = chain_to(self.model, place, self._actuators)
+        axes = [*place.axes, *(k for k in range(3) if k not in place.axes)][:2]
+        for state in (states[0], *states[::-every][::-1]):  # the last drawing shows the outcome
+            self._read(state)
+            points = np.vstack([data.xpos[bodies], *[place.position(data)] * carried])[:, axes]
+            if not chains:
+                origin = points[-1] if self._displacement and carried else 0.0
+            chains.append(points - origin)
+        return Sketch(outcome, every * self.model.opt.timestep, np.stack(chains[1:]))
+
+    def _begin(self, keyframe: str, file: str) -> tuple[Array, Array]:
+        """Start configuration (a full physics state), and commands ``(nu,)`` that hold it."""
+        data = self._data[0]
+        if keyframe:
+            names = [self.model.key(k).name for k in range(self.model.nkey)]
+            if keyframe not in names:
+                raise unknown(f"keyframe of {file}", keyframe, names)
+            mujoco.mj_resetDataKeyframe(self.model, data, names.index(keyframe))
+        mujoco.mj_forward(self.model, data)
+        held = holding(self.model, data)
+        for k in np.flatnonzero(self.model.actuator_actadr >= 0):  # a filtered command has no delay at the start
+            data.act[self.model.actuator_actadr[k] + self.model.actuator_actnum[k] - 1] = held[k]
+        data.time = 0
+        home = np.empty(mujoco.mj_stateSize(self.model, _STATE))
+        mujoco.mj_getState(self.model, data, home, _STATE)
+        return home, held
+
+    def _commands(self, theta: Array, rng: np.random.Generator) -> Array:
+        """``(n_steps, nu)``, the commands of theta with motor noise, held after the end of the movement."""
+        check_rng(rng)
+        controller = self._controller
+        lasts = controller.duration(theta) if isinstance(controller, GaussianPrimitive) else self._longest
+        # Noise is drawn even if ``noise`` is 0, so that later draws do not depend on ``noise``.
+        shift = self.noise * self._sides * rng.standard_normal(len(self._sides))
+        commands = self._still(lasts)
+        times = np.minimum(self.model.opt.timestep * np.arange(len(commands)), lasts)
+        commands[:, self._actuators] = controller.at(theta, times) + shift
+        return commands
+
+    def _still(self, lasts: float) -> Array:
+        """``(n_steps, nu)``, the commands that hold the start configuration for a movement of ``lasts`` s."""
+        return np.tile(self._held, (int(np.ceil((lasts + self._settle) / self.model.opt.timestep)), 1))
+
+    def _simulate(self, contexts: Array, commands: Sequence[Array]) -> list[Array | None]:
+        """States of each movement, the first one before its first step; None if the simulation diverged."""
+        starts = np.stack([self._start(context) for context in contexts])
+        n_steps = [len(each) for each in commands]
+        controls = np.stack([np.pad(each, ((0, max(n_steps) - len(each)), (0, 0)), "edge") for each in commands])
+        run, _ = self._pool.rollout(self.model, self._data, starts, controls)
+        found = list[Array | None]()
+        for start, states, n in zip(starts, run, n_steps, strict=True):
+            # A diverging simulation stops, or begins again at the time 0; the first entry of a state is its time.
+            right = abs(states[n - 1, 0] - n * self.model.opt.timestep) < self.model.opt.timestep / 2
+            found.append(np.concatenate([start[None], states[:n]]) if right else None)
+        return found
+
+    def _start(self, context: Array) -> Array:
+        start = self._home.copy()
+        start[[1 + address for address in self._addresses]] = context  # time, then all positions
+        return start
+
+    def _outcome(self, states: Array | None) -> Array:
+        if states is None:
+            return np.full(self._dim, np.nan)
+        return self._read(states[-1]) - self._read(states[0]) if self._displacement else self._read(states[-1])
+
+    def _read(self, state: Array) -> Array:
+        """``(outcome_dim,)``, the measured places in a full physics state."""
+        data = self._data[0]
+        mujoco.mj_setState(self.model, data, state, _STATE)
+        mujoco.mj_kinematics(self.model, data)
+        return np.concatenate([place.read(data) for place in self._places])
+
+    def _find_spaces(self, low: tuple[float, ...], high: tuple[float, ...], file: str) -> None:
+        """Set T, ``rest`` and ``outcome_noise``."""
+        names = [name for place in self._places for name in place.names]
+        self._dim, unit, middle = len(names), self._places[0].unit, (self.contexts.low + self.contexts.high) / 2
+        (still,) = self._simulate(middle[None], [self._still(self._longest)])
+        if still is None:
+            raise ValueError(f"{file} diverges even while it holds still; is its timestep too long?")
+        rest = self._outcome(still)
+        if low or high:
+            corners = [check_point(name, each, self._dim) for name, each in (("low", low), ("high", high))]
+        else:
+            corners = self._explored(rest, names, file)
+        self.outcomes = Box(corners[0], corners[1], tuple(names), unit)
+        self.rest = self.outcomes.clip(np.round(rest, 3))
+        self.rest.flags.writeable = False
+        self.outcome_noise = 0.0
+        if self.noise:
+            one, other = (self._tried(REPEATED, execution)[1] for execution in ("one", "other"))
+            self.outcome_noise = float(np.sqrt(np.nanmean(np.square(one - other)) / 2))
+
+    def _explored(self, rest: Array, names: Sequence[str], file: str) -> list[Array]:
+        """Corners of T, found by random movements."""
+        starts, ends = self._tried(EXPLORED, "T")
+        lost = int(np.isnan(ends).any(axis=1).sum())
+        moved = ends[(np.abs(ends - starts) > MOVED).any(axis=1)]
+        if len(moved) < FEWEST:
+            raise ValueError(
+                f"{len(moved)} of {EXPLORED} random movements of {file} move {', '.join(names)}, {lost} diverge; give "
+                "low and high, which are the corners of T, or put the object nearer to the robot"
+            )
+        low, high = np.quantile(moved, (0.05, 0.95), axis=0)  # an object that flies away does not set the size of T
+        low, high = np.minimum(low, rest) - 0.1 * (high - low), np.maximum(high, rest) + 0.1 * (high - low)
+        flat = [name for name, side in zip(names, high - low, strict=True) if side < MOVED]
+        if flat:
+            raise ValueError(f"{', '.join(flat)} never changes; leave it out, as in site:tip:xy")
+        # Round numbers stay equal if a replay finds T again on another processor.
+        scale = 10.0 ** (1 - np.floor(np.log10((high - low).max())))
+        corners = np.floor(low * scale) / scale, np.ceil(high * scale) / scale
+        texts = [",".join(f"{x:g}" for x in corner) for corner in corners]
+        self.remarks.append(
+            f"T was found by {EXPLORED} random movements, of which {len(moved)} moved {', '.join(names)}"
+            f"{f' and {lost} diverged' if lost else ''}: --environment.low {texts[0]} --environment.high {texts[1]}"
+        )
+        return [*corners]
+
+    def _tried(self, n: int, execution: str) -> tuple[Array, Array]:
+        """Measured places at the start, and outcomes, of ``n`` random movements; the noise depends on ``execution``."""
+        rngs = [stream(0, "random movements", k) for k in range(n)]
+        contexts = np.stack([self.contexts.sample(rng) for rng in rngs])
+        thetas = np.stack([self.policies.sample(rng) for rng in rngs])
+        ends = self.execute_many(contexts, thetas, [stream(0, execution, k) for k in range(n)])
+        starts = np.zeros_like(ends) if self._displacement else np.stack([self._read(self._start(c)) for c in contexts])
+        return starts, ends

@@ -1,0 +1,247 @@
+"""A robot from its model file: its outcome is where the model says, whatever the file; slips are told in a line."""
+
+import re
+from functools import partial
+
+import numpy as np
+import pytest
+
+from runs import about_of
+from sgimd_torch import MujocoRobot, SimulationError, check_environment, stream
+from sgimd_torch.demonstrations.units import moving
+from sgimd_torch.environments.controllers import Sinusoids
+from sgimd_torch.runs.command_line import main
+from sgimd_torch.runs.process import command
+from sgimd_torch.runs.read import config_of, read_run
+from sgimd_torch.runs.tasks import Task
+from sgimd_torch.teach.leading import Leading
+from sgimd_torch.teach.led import hand_led_of
+from sgimd_torch.teach.lessons import lesson_by_hand
+from sgimd_torch.views.check import main as check
+
+# An arm of two links of .3 m in the plane z = .05, a puck of radius .04 beside it, and a door.
+ARM = """<mujoco>
+  <option timestep=".005" integrator="implicitfast"/>
+  <default><geom density="500"/><joint damping="1"/></default>
+  <asset><mesh name="tooth" file="tooth.obj"/></asset>
+  <worldbody>
+    <geom type="plane" size="2 2 .1"/>
+    <body name="upper" pos="0 0 .05"><joint name="shoulder" axis="0 0 1" range="-120 120"/>
+      <geom type="capsule" fromto="0 0 0 .3 0 0" size=".02"/>
+      <body name="fore" pos=".3 0 0"><joint name="elbow" axis="0 0 1" range="-90 90"/>
+        <geom type="capsule" fromto="0 0 0 .3 0 0" size=".02"/>
+        <geom type="mesh" mesh="tooth" contype="0" conaffinity="0"/>
+        <site name="tip" pos=".3 0 0"/></body></body>
+    <body name="puck" pos=".4 .3 .03"><freejoint/><geom type="cylinder" size=".04 .03"/></body>
+    <body name="door" pos="-1 0 .1"><joint name="hinge" axis="0 0 1"/><geom name="leaf" size=".1 .01 .05"/></body>
+  </worldbody>
+  <actuator>
+    <position name="shoulder" joint="shoulder" kp="60" kv="6"/><position joint="elbow" kp="60" kv="6"/>
+  </actuator>
+  <keyframe><key name="bent" qpos="1 .5 .4 .3 .03 1 0 0 0 0"/></keyframe>
+</mujoco>"""
+TOOTH = "v 0 0 0\nv .01 0 0\nv 0 .01 0\nv 0 0 .01\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+LINK = (
+    '<link name="{}"><inertial><origin xyz=".1 0 0"/><mass value="1"/>'
+    '<inertia ixx=".01" iyy=".01" izz=".01" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+)
+JOINT = (
+    '<joint name="{}" type="{}"><parent link="{}"/><child link="{}"/><origin xyz="{} 0 0"/><axis xyz="0 1 0"/>'
+    '<limit lower="-1" upper="1" effort="30" velocity="5"/></joint>'
+)
+URDF = (
+    '<robot name="arm"><link name="base"/>'
+    + LINK.format("upper")
+    + JOINT.format("shoulder", "revolute", "base", "upper", 0)
+    + LINK.format("fore")
+    + JOINT.format("elbow", "revolute", "upper", "fore", 0.3)
+    + '<link name="tool"/>'
+    + JOINT.format("flange", "fixed", "fore", "tool", 0.2)
+    + "</robot>"
+)
+LIMITS = np.deg2rad([120, 90])
+CORNERS = {"low": (-1.0, -1.0), "high": (1.0, 1.0)}
+NONE = np.zeros(0)
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("models")
+    for name, text in (("arm.xml", ARM), ("arm.urdf", URDF), ("tooth.obj", TOOTH)):
+        (folder / name).write_text(text)
+    return folder
+
+
+@pytest.fixture
+def here(files, monkeypatch):
+    monkeypatch.chdir(files)
+    return files
+
+
+def steady(*angles, pace=0.5, limits=LIMITS):
+    """The movement all of whose knots are at these angles (rad)."""
+    return np.append(np.repeat([0.5 + angle / limit / 2 for angle, limit in zip(angles, limits, strict=True)], 4), pace)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"outcome": "site:tip:xy", "noise": 0.01},
+        {"outcome": "body:puck:xy", "context": "body:puck:x:.35:.45,body:puck:y:.2:.35", "threads": 2},
+        {"outcome": "body:puck:yx,site:tip:x", "displacement": True, "keyframe": "bent"},
+        {"outcome": "joint:elbow", "joints": ("elbow",), "n_knots": 6, "context": "joint:hinge:-.1:.1"},
+        {"outcome": "geom:leaf:x", "low": (-2.0,), "high": (0.0,)},
+        {"outcome": "site:tip:xy", "controller": partial(Sinusoids, frequencies=(0.2, 2.0)), "durations": (0.5, 0.8)},
+        {"model": "arm.urdf", "outcome": "body:tool:xz"},
+    ],
+)
+def test_a_robot_from_a_file_keeps_every_promise(here, options):
+    check_environment(MujocoRobot(**{"model": "arm.xml", **options}))
+
+
+@pytest.mark.parametrize(("shoulder", "elbow"), [(0.0, 0.0), (np.pi / 2, 0.0), (-0.5, 1.0)])
+def test_the_tip_ends_where_the_joints_put_it(here, shoulder, elbow):
+    robot = MujocoRobot("arm.xml", outcome="site:tip", low=(-1, -1, 0), high=(1, 1, 1))
+    ended = robot.execute(NONE, steady(shoulder, elbow), stream(0, "x"))
+    turned = np.cumsum([shoulder, elbow])
+    assert ended == pytest.approx([0.3 * np.cos(turned).sum(), 0.3 * np.sin(turned).sum(), 0.05], abs=0.01)
+    assert robot.outcomes.axis(2) == "tip z (m)"
+    assert robot.rest == pytest.approx([0.6, 0, 0.05], abs=0.001)
+
+
+def test_servos_are_made_for_a_urdf_and_hold_the_arm_against_gravity(here):
+    robot = MujocoRobot("arm.urdf", outcome="joint:shoulder,joint:elbow", **CORNERS)
+    assert robot.remarks == ["arm.urdf has no actuators: position servos were made for shoulder, elbow"]
+    ended = robot.execute(NONE, steady(0.6, -0.4, limits=(1, 1)), stream(0, "x"))
+    assert ended == pytest.approx([0.6, -0.4], abs=0.06)
+    assert robot.outcomes.axis(0) == "shoulder (rad)"
+
+
+def test_meshes_of_a_ros_package_are_found_from_its_folder_on(here):
+    (here / "urdf").mkdir()
+    mesh = '<collision><geometry><mesh filename="package://arm/tooth.obj"/></geometry></collision>'
+    (here / "urdf/toothed.urdf").write_text(URDF.replace('<link name="fore">', f'<link name="fore">{mesh}'))
+    robot = MujocoRobot("urdf/toothed.urdf", outcome="body:tool:xz", **CORNERS)
+    assert [path.name for path in robot.files] == ["tooth.obj", "toothed.urdf"]
+
+
+def test_an_object_begins_where_its_context_says_and_stays_there_if_missed(here):
+    place = "body:puck:x:.3:.5,body:puck:y:-.4:.4,joint:hinge:-1:1"
+    robot = MujocoRobot("arm.xml", outcome="body:puck:xy,body:door:x", context=place, low=(-1, -1, -2), high=(1, 1, 1))
+    assert robot.contexts.names == ("puck x", "puck y", "hinge (rad)")
+    away = robot.execute([0.45, 0.35, 0.2], steady(-1.5, 0.0), stream(0, "x"))
+    assert away == pytest.approx([0.45, 0.35, -1], abs=1e-3)
+    hit = robot.execute([0.45, 0.1, 0.2], np.append([0, 0.3, 0.7, 1, 0.5, 0.5, 0.5, 0.5], 0.5), stream(0, "x"))
+    assert hit[1] > 0.15
+    shifted = MujocoRobot("arm.xml", outcome="body:puck:xy", context=place, displacement=True, **CORNERS)
+    assert shifted.execute([0.45, 0.35, 0.2], steady(-1.5, 0.0), stream(0, "x")) == pytest.approx([0, 0], abs=1e-3)
+    moved = shifted.execute([0.45, 0.1, 0.2], np.append([0, 0.3, 0.7, 1, 0.5, 0.5, 0.5, 0.5], 0.5), stream(0, "x"))
+    assert moved == pytest.approx(hit[:2] - [0.45, 0.1])
+
+
+def test_a_joint_that_was_not_chosen_holds_its_start_in_the_keyframe(here):
+    robot = MujocoRobot("arm.xml", outcome="joint:shoulder", joints=("elbow",), keyframe="bent", low=(-2,), high=(2,))
+    assert robot.policies.dim == 5
+    assert robot.execute(NONE, np.array([0.0, 0.9, 0.1, 0.9, 0.3]), stream(0, "x")) == pytest.approx([1.0], abs=0.02)
+
+
+def test_most_movements_end_in_the_task_space_that_was_found_and_a_remark_tells_it(here):
+    robot = MujocoRobot("arm.xml", outcome="site:tip:xy")
+    rngs = [stream(7, "x", k) for k in range(60)]
+    ended = robot.execute_many(np.zeros((60, 0)), np.stack([robot.policies.sample(rng) for rng in rngs]), rngs)
+    assert robot.outcomes.contains(ended).mean() > 0.85
+    low, high = (",".join(f"{x:g}" for x in corner) for corner in (robot.outcomes.low, robot.outcomes.high))
+    assert f"--environment.low {low} --environment.high {high}" in robot.remarks[0]
+    assert (robot.outcomes.sides < 1.6).all()
+
+
+def test_noise_shifts_the_commands_by_its_share_of_their_range(here):
+    robot = MujocoRobot("arm.xml", outcome="joint:elbow", noise=0.02, low=(-2,), high=(2,))
+    ends = [robot.execute(NONE, steady(0, 0), stream(k, "x"))[0] for k in range(100)]
+    assert np.std(ends) == pytest.approx(0.02 * np.pi, rel=0.25)
+    assert robot.outcome_noise == pytest.approx(0.02 * np.pi, rel=0.3)
+
+
+def test_a_recording_is_translated_to_the_movement_that_was_recorded(here):
+    robot = MujocoRobot("arm.xml", outcome="site:tip:xy", n_knots=6, **CORNERS)
+    theta = robot.policies.sample(stream(0, "x"))
+    assert robot.correspondence(*robot.primitive.trajectory(theta)) == pytest.approx(theta, abs=1e-6)
+
+
+@pytest.mark.parametrize("options", [{}, {"displacement": True}])
+def test_the_arm_is_drawn_from_its_base_to_the_outcome(here, options):
+    robot = MujocoRobot("arm.xml", outcome="site:tip:xy", **CORNERS, **options)
+    drawn = robot.trace(NONE, steady(0.5, 0.5), stream(0, "x"))
+    assert drawn.chains[-1, -1] == pytest.approx(drawn.outcome)
+    assert np.linalg.norm(np.diff(drawn.chains, axis=1)[:, 0], axis=1) == pytest.approx(0.3, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"outcome": "site:tp"}, "outcome 'site:tp': the model has no site 'tp'; did you mean tip?"),
+        ({"outcome": "site:puck"}, "the model has no site 'puck'; write body:puck"),
+        ({"outcome": "tip"}, "write KIND:NAME, such as site:tip; kinds are site, body, geom, joint"),
+        ({"outcome": ""}, "outcome is missing: it names what goals are about, such as site:tip, body:upper"),
+        ({"outcome": "site:tip:xw"}, "'xw' are no axes"),
+        ({"outcome": "site:tip"}, "tip z never changes; leave it out"),
+        ({"outcome": "site:tip:x,joint:elbow"}, "mixes lengths (m) and angles (rad)"),
+        ({"outcome": "geom:leaf"}, "0 of 300 random movements of arm.xml move leaf x, leaf y, leaf z, 0 diverge"),
+        ({"joints": ("elbo",)}, "joints: 'elbo' is no joint with an actuator; did you mean elbow?"),
+        ({"joints": ("hinge",)}, "'hinge' is no joint with an actuator"),
+        ({"keyframe": "bend"}, "unknown keyframe of arm.xml 'bend'; did you mean bent?"),
+        ({"context": "body:puck:0:1"}, "write body:NAME:AXIS:LOW:HIGH"),
+        ({"context": "body:door:x:0:1"}, "only a body with a free joint has an axis x, y or z; else write joint:NAME"),
+        ({"context": "joint:hinge:1:0"}, "1 and 0 must be two numbers, the lower one first"),
+        ({"model": ""}, "model is missing: the path of an MJCF or URDF file"),
+        ({"model": "tooth.obj"}, "tooth.obj cannot be used: "),
+        ({"settle": -1.0}, "settle must be finite and >= 0"),
+        ({"n_knots": 1}, "n_knots must be a whole number >= 2"),
+        ({"low": (0.0, 0.0, 0.0), "high": (1.0, 1.0)}, "low must have shape (..., 2)"),
+    ],
+)
+def test_a_slip_is_told_in_one_line(here, options, said):
+    with pytest.raises(ValueError, match=re.escape(said)) as raised:
+        MujocoRobot(**{"model": "arm.xml", "outcome": "site:tip:xy", **options})
+    assert "\n" not in str(raised.value)
+
+
+def test_a_model_that_diverges_is_told(here):
+    (here / "stiff.xml").write_text(ARM.replace('kp="60" kv="6"', 'kp="1e7"').replace("implicitfast", "Euler"))
+    with pytest.raises(ValueError, match=r"0 of 300 random movements of stiff.xml move tip x, tip y, 300 diverge"):
+        MujocoRobot("stiff.xml", outcome="site:tip:xy")
+    robot = MujocoRobot("stiff.xml", outcome="site:tip:xy", **CORNERS)
+    with pytest.raises(SimulationError, match="the simulation diverged in context"):
+        robot.execute(NONE, steady(1.0, 1.0), stream(0, "x"))
+
+
+def test_a_run_needs_no_code_and_tells_which_file_of_the_model_has_changed(here, capsys):
+    robot = "--environment mujoco --environment.model arm.xml --environment.outcome site:tip:xy --environment.low -1,-1"
+    words = f"{robot} --environment.high 1,1 --algorithm random --repeats 0 --evaluate-at 20".split()
+    assert command(main, [*words, "--movements", "20"]) == 0
+    run = here / "runs/random/seed-000"
+    assert {"file arm.xml", "file tooth.obj"} <= about_of(run)["versions"].keys()
+    assert config_of(read_run(run))["environment.outcome"] == "site:tip:xy"  # a text with a colon, but no code
+    (here / "tooth.obj").write_text(f"{TOOTH}# sharper\n")
+    capsys.readouterr()
+    assert command(main, [*words, "--movements", "30", "--resume"]) == 0
+    assert "resumed with other versions: file tooth.obj crc32" in capsys.readouterr().err
+    assert command(check, ["mujoco", "--environment.model", "arm.xml", "--environment.outcome", "site:tpi"]) == 2
+    assert "did you mean tip?" in capsys.readouterr().err
+    assert command(check, ["mujoco", "--environment.model", "lost.xml"]) == 2
+    assert "lost.xml cannot be read or written" in capsys.readouterr().err
+
+
+def test_an_arm_is_led_by_its_tip_to_where_its_movement_then_ends(here):
+    robot = MujocoRobot("arm.xml", outcome="site:tip:xy", context="body:puck:x:-.5:-.4", keyframe="bent", **CORNERS)
+    leading = Leading(hand_led_of(Task(robot)))
+    assert leading.q == pytest.approx([1.0, 0.5], abs=1e-6)
+    leading.grab()
+    leading.begin_recording()
+    for _ in range(60):
+        leading.drag([0.45, 0.2, 0.05])
+        leading.step(0.02)
+    lesson = lesson_by_hand(*moving(*leading.end_recording()), Task(robot), stream(0, "x"))
+    assert lesson.demonstration.outcome == pytest.approx([0.45, 0.2], abs=0.03)
+    pushing = MujocoRobot("arm.xml", outcome="body:puck:xy", **CORNERS)
+    assert hand_led_of(Task(pushing)).hand == "fore"
