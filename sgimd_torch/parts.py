@@ -35,11 +35,9 @@ class Problem:
 
     Attributes:
         contexts, policies, outcomes: boxes C, Pi and T.
-        rest: ``(outcome_dim,)`` tau_org, the outcome of not moving.
-        outcome_noise: standard deviation of each outcome dimension, in the unit of T.
+        rest, outcome_noise: outcome of not moving, and standard deviation of outcomes; see `Environment`.
         tolerance: distance in the unit of T at which a goal counts as reached: the outcome noise, but at least .02.
-        memory: exemplars of the learner.
-        inverse: inverse model, which is made before all other parts.
+        memory, inverse: exemplars and inverse model of the learner; the inverse model is the first part made.
         remarks: sentences for the user, for example that exploration does not widen.
         autonomous: autonomous strategy, which is made before the social one.
 
@@ -171,8 +169,7 @@ class Inverse(Part):
         return None
 
     def effects(self) -> Memory | None:
-        """Exemplars with an effect, if most movements of the robot have no effect. Default: None, which means that all
-        movements have an effect."""
+        """Exemplars with an effect, if most movements have none. Default: None, which means that all have one."""
         return None
 
 
@@ -214,8 +211,7 @@ class Strategy(Part):
 
     @abstractmethod
     def attempt(self, context: Array) -> AskingAttempt:
-        """Yield the movements of an attempt in one context. Every attempt must contain a movement or a rest, even if a
-        request has no reply."""
+        """Yield the movements of an attempt in one context: at least one movement or rest, even without a reply."""
 
     @property
     def regions(self) -> Sequence[Any]:
