@@ -1,4 +1,4 @@
-"""What `LocalProcess` and `LocallyLinear` compute for one goal, compiled by numba.
+"""What `LocalProcess` computes for one goal, compiled by numba.
 
 A local Gaussian process is fitted to a hundred movements and asked about some fifty candidates, by arrays so small that
 calls of numpy would take ten times as long as their arithmetic. Compiled functions release Python's lock.
@@ -8,38 +8,22 @@ Import this module through `compiled`: loading numba takes half a second.
 from __future__ import annotations
 
 import math
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
-from numba import njit, types
+from numba import njit
 
+from sgimd_torch.inverses.jit import LISTS, NUMBER, NUMBERS, ROWS, TABLE, called, columns, inner, squared_distance
 from sgimd_torch.spaces import Array
 
 STEPS, STARTS = 4, 3  # number of Gauss-Newton steps from each start, and of exemplars where steps begin
 DAMPINGS: Final = (1e-3, 0.1, 1.0, 10.0)
 CLEARLY: Final = 0.8  # error, relative to that of the nearest exemplar, below which a candidate is clearly better
-ALPHA, WIDTH = 0.5, 1.0  # weight of a neighbourhood's spread in eq. (8), and width of the Gaussian of eq. (9)
-# Ridge, relative to the variance of the outcomes; with a larger ridge the answer is nearer to eq. (9). The ridge also
-# makes the regression unique when outcomes lie on a line, or are fewer than the slopes.
-RIDGE: Final = 1e-3
-COINCIDENT: Final = 1e-12  # least spread of outcomes relative to their size; below it, they count as one: no slope
 TINY: Final = 1e-300
-SMALLEST: Final = float(np.finfo(float).tiny)
 ROOT5: Final = float(np.sqrt(5))
 LOG2: Final = math.log(2)
 LOG2_HIGH, LOG2_LOW = 0.693147180369123816, 1.90821492927058770e-10  # sum to log 2; n times the first is exact
 TERMS: Final = tuple(1 / math.factorial(k) for k in range(13, 0, -1))  # of the series of e^r, all but 1
-
-_FAST: Final = {"reassoc", "contract", "nsz", "arcp"}  # sums may be reordered; NaN and infinity keep their meaning
-_inner = njit(nogil=True, fastmath=_FAST)
-_number, _numbers = types.float64, types.Array(types.float64, 1, "C", readonly=True)
-_table, _rows = types.Array(types.float64, 2, "C", readonly=True), types.Array(types.int64, 1, "C", readonly=True)
-_lists = types.Array(types.int64, 2, "C", readonly=True)
-
-
-def _called(*arguments: types.Type) -> Any:
-    """Decorator of a function that Python calls. Its types are given, so it is compiled when this module is loaded."""
-    return njit(tuple(arguments), cache=True, nogil=True, fastmath=_FAST)
 
 
 class Process(NamedTuple):
@@ -62,25 +46,6 @@ class Process(NamedTuple):
     variance: float
 
 
-@_inner
-def squared_distance(one: Array, other: Array) -> float:
-    """Squared distance of two points."""
-    total = 0.0
-    for k in range(len(one)):
-        total += (one[k] - other[k]) ** 2
-    return total
-
-
-@_inner
-def columns(table: Array, rows: np.ndarray) -> Array:
-    """``(dim, n)``, these rows of a table."""
-    found = np.empty((table.shape[1], len(rows)))
-    for j in range(len(rows)):
-        for k in range(len(found)):
-            found[k, j] = table[rows[j], k]
-    return found
-
-
 @njit(nogil=True)
 def exponential(x: float) -> float:
     """e^x = 2^n e^r for x <= 0. Numba computes several at once, so each takes a quarter of the time of `np.exp`, and an
@@ -94,14 +59,14 @@ def exponential(x: float) -> float:
     return (1 + series) * np.int64((np.int64(n) + 1023) << 52).view(np.float64)
 
 
-@_inner
+@inner
 def matern(distance: float) -> tuple[float, float]:
     """Matern 5/2 kernel, and its derivative divided by the distance."""
     decay = exponential(-ROOT5 * distance)
     return (1 + ROOT5 * distance + 5 / 3 * distance**2) * decay, -5 / 3 * (1 + ROOT5 * distance) * decay
 
 
-@_inner
+@inner
 def covariances(inputs: Array, kernel: Array, point: Array, covariance: Array, slope: Array) -> None:
     """Write the covariances of ``point`` ``(dim,)`` with the first ``len(covariance)`` of ``inputs`` ``(dim, n)``, and
     their derivatives by the point, divided by the difference of the inputs."""
@@ -120,7 +85,7 @@ def covariances(inputs: Array, kernel: Array, point: Array, covariance: Array, s
         covariance[j], slope[j] = value, scale**2 * by_distance
 
 
-@_called(_table, _numbers)
+@called(TABLE, NUMBERS)
 def correlations(inputs: Array, kernel: Array) -> tuple[Array, Array]:
     """Covariance matrix ``(n, n)`` of ``inputs`` ``(dim, n)``, without noise, and its slopes, see `covariances`; the
     lower halves alone."""
@@ -131,7 +96,7 @@ def correlations(inputs: Array, kernel: Array) -> tuple[Array, Array]:
     return found, slopes
 
 
-@_inner
+@inner
 def solve_lower(lower: Array, b: Array) -> None:
     """``b`` ``(n,)`` becomes ``lower``^-1 b."""
     for i in range(len(b)):
@@ -141,7 +106,7 @@ def solve_lower(lower: Array, b: Array) -> None:
         b[i] = (b[i] - total) / lower[i, i]
 
 
-@_inner
+@inner
 def solve_transposed(lower: Array, b: Array) -> None:
     """``b`` ``(n,)`` becomes ``lower``^-T b."""
     for i in range(len(b) - 1, -1, -1):
@@ -150,7 +115,7 @@ def solve_transposed(lower: Array, b: Array) -> None:
             b[k] -= lower[i, k] * b[i]
 
 
-@_inner
+@inner
 def fitted(inputs: Array, outcomes: Array, kernel: Array) -> Process:
     """The process of movements with ``inputs`` ``(dim, n)`` and ``outcomes`` ``(outcome_dim, n)``."""
     m, n = outcomes.shape
@@ -168,7 +133,7 @@ def fitted(inputs: Array, outcomes: Array, kernel: Array) -> Process:
     return Process(inputs, kernel, factor, weights, mean, max(total / (n * m), TINY))
 
 
-@_inner
+@inner
 def precisions(factor: Array, last: int) -> Array:
     """Diagonal of the inverse covariance for the ``last`` movements, which need the last corner of the factor alone."""
     first = len(factor) - last
@@ -179,7 +144,7 @@ def precisions(factor: Array, last: int) -> Array:
     return found
 
 
-@_inner
+@inner
 def unknown(process: Process, covariance: Array) -> float:
     """Variance of the outcome of a point that has this ``covariance`` with the inputs, without noise."""
     known = covariance.copy()
@@ -187,20 +152,20 @@ def unknown(process: Process, covariance: Array) -> float:
     return process.variance * max(1 - float(known @ known), 0.0)
 
 
-@_inner
+@inner
 def expected(process: Process, covariance: Array) -> Array:
     """Expected outcome of a point that has this ``covariance`` with the inputs."""
     return process.weights @ covariance + process.mean
 
 
-@_inner
+@inner
 def expected_error(process: Process, goal: Array, doubt: float, covariance: Array, limit: float) -> float:
     """Expected squared error, the variance times ``doubt`` included; any number above ``limit`` if it is larger."""
     error = squared_distance(expected(process, covariance), goal)
     return error if error >= limit else error + doubt * unknown(process, covariance)
 
 
-@_inner
+@inner
 def in_lengths(theta: Array, context: Array, units: Array) -> Array:
     """Input ``(dim,)`` of the process; ``units``: ``(2, dim)``, origin and size of a length."""
     found, t = np.empty(units.shape[1]), len(theta)
@@ -209,7 +174,7 @@ def in_lengths(theta: Array, context: Array, units: Array) -> Array:
     return found
 
 
-@_inner
+@inner
 def descend(
     process: Process, start: Array, context: Array, goal: Array, doubt: float, units: Array, spreads: Array, box: Array
 ) -> tuple[float, Array]:
@@ -244,13 +209,13 @@ def descend(
     return least, found
 
 
-@_inner
+@inner
 def learnt_from(near: np.ndarray, alike: np.ndarray, n: int) -> np.ndarray:
     """Rows that a process is fitted to: those of ``alike``, which are nearest first in each list, by turns, and at the
     end those ``near`` the goal."""
     rows, new = np.empty(alike.shape[1], np.int64), np.ones(n, np.bool_)
-    rows[len(rows) - len(near) :] = near
-    new[near] = False
+    for j in range(len(near)):  # a slice would compile for 2 s
+        rows[len(rows) - len(near) + j], new[near[j]] = near[j], False
     count = 0
     for i in range(alike.shape[1]):
         for row in alike[:, i]:
@@ -260,7 +225,7 @@ def learnt_from(near: np.ndarray, alike: np.ndarray, n: int) -> np.ndarray:
     return rows
 
 
-@_called(_rows, _lists, _table, _table, _table, _numbers, _numbers, _numbers, _numbers, _table, _numbers, _table)
+@called(ROWS, LISTS, TABLE, TABLE, TABLE, NUMBERS, NUMBERS, NUMBERS, NUMBERS, TABLE, NUMBERS, TABLE)
 def answer(
     near: np.ndarray,
     alike: np.ndarray,
@@ -327,62 +292,7 @@ def answer(
     return best.copy() if least < CLEARLY * nearest else thetas[near[0]].copy()
 
 
-@_inner
-def spread(outcomes: Array) -> float:
-    """Standard deviation of ``outcomes`` ``(outcome_dim, n)``."""
-    total, n = 0.0, outcomes.shape[1]
-    for k in range(len(outcomes)):
-        total += n * outcomes[k].var()
-    return np.sqrt(total / (n - 1))
-
-
-@_called(_lists, _table, _table, _numbers, _table)
-def locally_linear(alike: np.ndarray, thetas: Array, outcomes: Array, goal: Array, box: Array) -> tuple[int, Array]:
-    """The answer of `LocallyLinear`: the number of the best neighbourhood, and theta.
-
-    Args:
-        alike: ``(h, k)`` neighbourhoods K_h of eq. (8) as rows, theta_h first; -1 where there are fewer than k.
-        thetas, outcomes: ``(n, theta_dim)`` and ``(n, outcome_dim)``, all movements in memory.
-        goal: ``(outcome_dim,)``.
-        box: ``(2, theta_dim)``, corners of the box around all thetas.
-    """
-    sizes, spreads, n_known = np.zeros(len(alike), np.int64), np.empty(len(alike)), 0
-    for h in range(len(alike)):
-        while sizes[h] < alike.shape[1] and alike[h, sizes[h]] >= 0:
-            sizes[h] += 1
-        if sizes[h] > 1:  # a movement without neighbours gets the median of the other spreads, see `inverses.local`
-            spreads[n_known] = spread(columns(outcomes, alike[h, : sizes[h]]))
-            n_known += 1
-    middle, n_known = np.median(spreads[:n_known]) if n_known else 0.0, 0
-    best, least = 0, np.inf
-    for h in range(len(alike)):
-        unreliability = np.sqrt(squared_distance(outcomes[alike[h, 0]], goal))
-        unreliability += ALPHA * (spreads[n_known] if sizes[h] > 1 else middle)
-        n_known += sizes[h] > 1
-        if unreliability < least:
-            best, least = h, unreliability
-    rows = alike[best, : sizes[best]]
-    there, landed = columns(thetas, rows), columns(outcomes, rows)
-    weights = np.array([np.sqrt(squared_distance(landed[:, j], goal)) for j in range(len(rows))])
-    weights /= max(SMALLEST, WIDTH * weights.mean())
-    weights = np.exp(0.5 * (weights.min() ** 2 - weights**2))  # eq. (9), see `inverses.local`
-    weights /= weights.sum()
-    theta, outcome, largest = there @ weights, landed @ weights, np.abs(landed).max()
-    for k in range(len(theta)):  # a mean lies between the values that it averages; rounding must not move it out
-        theta[k] = min(max(theta[k], there[k].min()), there[k].max())
-        there[k] -= theta[k]
-    for k in range(len(outcome)):
-        landed[k] -= outcome[k]
-    covariance = (landed * weights) @ landed.T
-    variance = np.trace(covariance)
-    if variance > (COINCIDENT * largest) ** 2:
-        slope = np.linalg.solve(covariance + RIDGE * variance * np.eye(len(goal)), goal - outcome)
-        step = there @ (weights * (slope @ landed))
-        theta = np.minimum(np.maximum(theta + step, box[0]), box[1])
-    return best, theta
-
-
-@_called(_table, _table, _rows, _numbers, _numbers)
+@called(TABLE, TABLE, ROWS, NUMBERS, NUMBERS)
 def foretell(inputs: Array, outcomes: Array, rows: np.ndarray, here: Array, kernel: Array) -> tuple[Array, float]:
     """Expected outcome of a movement, and its variance, by the process of the movements in ``rows``."""
     process = fitted(columns(inputs, rows), columns(outcomes, rows), kernel)
@@ -391,7 +301,7 @@ def foretell(inputs: Array, outcomes: Array, rows: np.ndarray, here: Array, kern
     return expected(process, covariance), unknown(process, covariance)
 
 
-@_called(_table, _table, _table, _numbers, _number)
+@called(TABLE, TABLE, TABLE, NUMBERS, NUMBER)
 def scores(inputs: Array, outcomes: Array, kernels: Array, noises: Array, stated: float) -> Array:
     """Log likelihoods ``(kernels, noises)`` of movements under each kernel with each noise, see `choose_kernel`.
 
@@ -425,7 +335,7 @@ def scores(inputs: Array, outcomes: Array, kernels: Array, noises: Array, stated
     return found
 
 
-@_called(_table, _table, _table, _table, _number)
+@called(TABLE, TABLE, TABLE, TABLE, NUMBER)
 def gradient(inputs: Array, inverse: Array, weights: Array, slopes: Array, variance: float) -> tuple[Array, float]:
     """Derivatives of half the deviance (5.9 in Rasmussen & Williams) by log lengths ``(dim,)``, and by the noise.
 

@@ -50,6 +50,6 @@ class LocallyLinear(Inverse):
         """The corrected theta_g and the rows of K_best, from the rows ``near`` of the outcomes nearest to the goal."""
         memory = self._memory
         alike = memory.neighbourhoods(near, _ALIKE, self._radius)
-        kernels = compiled("sgimd_torch.inverses.kernels")
+        kernels = compiled("sgimd_torch.inverses.linear_kernel")
         best, theta = kernels.locally_linear(alike, memory.thetas, memory.outcomes, goal, memory.theta_range)
         return theta, alike[best][alike[best] >= 0]

@@ -9,6 +9,7 @@ scripts/setup compiles all, by `compile_all`.
 from __future__ import annotations
 
 import importlib
+import subprocess
 import sys
 import tempfile
 from functools import cache
@@ -41,9 +42,15 @@ def compiled(name: str) -> ModuleType:
 
 
 def compile_all() -> None:
-    """Compile all functions that are not in the cache yet."""
-    for name in ("sgimd_torch.memory.scan", "sgimd_torch.inverses.kernels"):
-        compiled(name)
+    """Compile all functions that are not in the cache yet, in one process for each module."""
+    names = ("sgimd_torch.inverses.kernels", "sgimd_torch.inverses.linear_kernel", "sgimd_torch.memory.scan")
+    programs = [f"from {__name__} import compiled; compiled({name!r})" for name in names]
+    _tell()
+    running = [subprocess.Popen([sys.executable, "-c", each], stderr=subprocess.PIPE, text=True) for each in programs]
+    for each in running:
+        _, said = each.communicate()
+        if each.returncode:
+            raise RuntimeError(said)
 
 
 @cache

@@ -1,6 +1,6 @@
 """Three learners learn to fish; a figure and a table show their results.
 
-The three runs have the same seed, the same simulated arm and the same motor noise; two of them run at a time. `random`
+The three runs have the same seed, the same simulated arm and the same motor noise; they run side by side. `random`
 moves at random. sgim-d has curiosity and a teacher. practice-taught, the best learner of this library, executes
 all demonstrations once, then makes one movement for each goal. The command writes to --out (default: runs/demo):
 
@@ -59,10 +59,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     began, base = time.monotonic(), configs["sgim-d"]
     for config in configs.values():
         build(config)  # a wrong option is refused before anything starts
-    say(f"{len(configs)} learners, {base.movements} movements each, seed {base.seed}, two at a time: {base.out}")
+    say(f"{len(configs)} learners, {base.movements} movements each, seed {base.seed}, side by side: {base.out}")
     say(*(f"{label(algorithm)} {does}" for algorithm, does in LEARNERS.items()))
-    longest_first = [config for config in reversed(configs.values()) if not finished(config)]
-    if failures := sweep(longest_first, processes=2):
+    unfinished = [config for config in configs.values() if not finished(config)]
+    if failures := sweep(unfinished, processes=len(configs)):
         raise Failed("\n".join(failures))
     variants = [Variant(name, [read_run(config.directory)]) for name, config in configs.items()]
     (figure,) = save_figure(partial(figure_of_curves, variants), base.out / "demo", "png")

@@ -1,0 +1,40 @@
+"""What compiled functions share: types of arguments, decorators, columns of tables, distances."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+from numba import njit, types
+
+from sgimd_torch.spaces import Array
+
+_FAST: Final = {"reassoc", "contract", "nsz", "arcp"}  # sums may be reordered; NaN and infinity keep their meaning
+inner = njit(nogil=True, fastmath=_FAST)
+NUMBER, NUMBERS = types.float64, types.Array(types.float64, 1, "C", readonly=True)
+TABLE, ROWS = types.Array(types.float64, 2, "C", readonly=True), types.Array(types.int64, 1, "C", readonly=True)
+LISTS = types.Array(types.int64, 2, "C", readonly=True)
+
+
+def called(*arguments: types.Type) -> Any:
+    """Decorator of a function that Python calls. Its types are given, so it is compiled when this module is loaded."""
+    return njit(tuple(arguments), cache=True, nogil=True, fastmath=_FAST)
+
+
+@inner
+def squared_distance(one: Array, other: Array) -> float:
+    """Squared distance of two points."""
+    total = 0.0
+    for k in range(len(one)):
+        total += (one[k] - other[k]) ** 2
+    return total
+
+
+@inner
+def columns(table: Array, rows: np.ndarray) -> Array:
+    """``(dim, n)``, these rows of a table."""
+    found = np.empty((table.shape[1], len(rows)))
+    for j in range(len(rows)):
+        for k in range(len(found)):
+            found[k, j] = table[rows[j], k]
+    return found
