@@ -56,7 +56,6 @@ JOINS_EVERY: Final = 30
 
 Early movements decide from which family of movements all later ones come, so each should know the outcomes before it.
 """
-_UNUSED: Final = stream(0, "context")  # for robots without contexts, where nothing is drawn
 
 Execute = Callable[[Sequence[int], Sequence[Array], Sequence[Array]], Sequence[Array | Failure]]
 """Function (indices, contexts, thetas) -> for each of these movements its outcome, or a failure."""
@@ -182,8 +181,7 @@ def _observed(learner: Learner, environment: Environment, index: int, place: int
     context = learner.context_at(place)
     if context is not None:
         return context
-    dim = environment.contexts.dim
-    return _tried("context", dim, observed, environment, stream(seed, "context", index) if dim else _UNUSED)
+    return _tried("context", environment.contexts.dim, observed, environment, stream(seed, "context", index))
 
 
 def _asked(

@@ -104,6 +104,20 @@ def test_what_cannot_be_observed_fails_before_the_learner_proposes_anything() ->
     assert (learner.movements, len(learner.memory)) == (5, 4)
 
 
+def test_a_robot_without_contexts_observes_with_the_stream_of_its_movement() -> None:
+    arm = FailingArm(lambda n: None)
+
+    def sometimes(rng: np.random.Generator) -> Array:
+        if rng.random() < 0.3:
+            raise TimeoutError("no camera")
+        return np.zeros(0)
+
+    arm.observe = sometimes
+    first, again = ([each.failed for each in run(practice(arm, 0), arm, 0, movements=20)] for _ in range(2))
+    assert first == again
+    assert 0 < sum(map(bool, first)) < 20
+
+
 def test_too_many_failures_in_a_row_end_a_run_which_can_go_on() -> None:
     arm = FailingArm(lambda n: ConnectionError("unplugged") if n in (1, 2) or 5 <= n < 8 else None)
     learner = practice(arm, 0)
