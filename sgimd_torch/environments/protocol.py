@@ -186,9 +186,6 @@ FAILURES: Final = 10
 """Number of successive failed movements after which a run ends."""
 
 
-_ROUNDING: Final = 1e-6  # distance from C, relative to its sides, that rounding may explain
-
-
 class SimulationError(RuntimeError):
     """A movement failed and has no usable outcome; if ``theta`` ``(theta_dim,)`` is given, the message names it."""
 
@@ -211,7 +208,7 @@ def observed(environment: Environment, rng: np.random.Generator) -> Array:
     if box.contains(context):
         return context
     clipped = box.clip(context)
-    if (np.abs(clipped - context) > _ROUNDING * box.sides).any():
+    if not box.same(context, clipped):
         box.check("context", context)
     warnings.warn("a context outside C by rounding was clipped; so are later ones", RuntimeWarning, stacklevel=2)
     return clipped

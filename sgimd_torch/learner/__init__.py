@@ -236,16 +236,12 @@ class Learner:
         if len(outcomes) != len(asked):
             raise ValueError(f"tell_many() needs {len(asked)} outcomes, one for each movement, got {len(outcomes)}")
         told = [self._checked(move, outcome) for (_, move), outcome in zip(asked, outcomes, strict=True)]
-        pairs = [(place, move if isinstance(move, Move) else None) for place, move in asked]
-        self._report_new(
-            *(
-                place
-                for (place, move), outcome in zip(pairs, told, strict=True)
-                if move is not None or not isinstance(outcome, Failure)
-            )
-        )
+        moves = [move if isinstance(move, Move) else None for _, move in asked]
+        # A failure without a movement leaves no trace of the attempt, so its beginning is reported by itself.
+        traceless = [move is None and isinstance(each, Failure) for move, each in zip(moves, told, strict=True)]
+        self._report_new(*(place for (place, _), each in zip(asked, traceless, strict=True) if not each))
         self._asked = []
-        for (place, move), outcome in zip(pairs, told, strict=True):
+        for (place, _), move, outcome in zip(asked, moves, told, strict=True):
             self._tell(place, move, outcome)
 
     def amend(self, theta: Array, *, place: int = 0) -> None:
