@@ -288,12 +288,13 @@ def test_a_recorded_movement_of_an_arm_ends_where_the_executed_one_does():
         theta = stream(0, "arm", k).random(5)
         sketch = arm.trace(context, theta, stream(1, "noise", k))
         np.testing.assert_array_equal(sketch.outcome, arm.execute(context, theta, stream(1, "noise", k)))
-        np.testing.assert_allclose(sketch.chains[-1, -1], sketch.outcome, atol=1e-12)
-        np.testing.assert_allclose(sketch.chains[:, 0], 0)
-        links = np.linalg.norm(np.diff(sketch.chains, axis=1), axis=2)
+        (chain,) = sketch.chains
+        np.testing.assert_allclose(chain[-1, -1], sketch.outcome, atol=1e-12)
+        np.testing.assert_allclose(chain[:, 0], 0)
+        links = np.linalg.norm(np.diff(chain, axis=1), axis=2)
         np.testing.assert_allclose(links, 0.2)  # of five links of an arm of 1 m, at every moment
-        np.testing.assert_allclose(sketch.chains[0, -1], [np.cos(0.3), np.sin(0.3)])  # straight, turned by the context
-        assert np.linalg.norm(np.diff(sketch.chains, axis=0), axis=2).max() < 0.6  # without a jump
+        np.testing.assert_allclose(chain[0, -1], [np.cos(0.3), np.sin(0.3)])  # straight, turned by the context
+        assert np.linalg.norm(np.diff(chain, axis=0), axis=2).max() < 0.6  # without a jump
     assert sketch.landed == pytest.approx(1.0)
 
 
