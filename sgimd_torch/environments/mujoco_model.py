@@ -62,6 +62,25 @@ class Place:
         return [f"{self.name} {_AXES[axis]}" for axis in self.axes] or [self.name]
 
 
+def file_of(model: str | Path) -> Path:
+    """The file of a model: its path, or the scene of a robot of the package mujoco-menagerie, such as menagerie:aloha.
+
+    Raises:
+        ValueError: the package is not installed, it has no such robot, or it cannot download the robot.
+    """
+    collection, _, name = str(model).partition(":")
+    if collection != "menagerie":
+        return Path(model)
+    try:
+        import mujoco_menagerie  # an optional dependency
+    except ImportError as error:
+        raise ValueError(f"{model} needs a package that is not installed: pip install mujoco-menagerie") from error
+    try:
+        return Path(mujoco_menagerie.get(name).xml())
+    except mujoco_menagerie.MenagerieError as error:
+        raise ValueError(f"model {model}: {error}") from error
+
+
 def load_model(path: Path, joints: Sequence[str]) -> tuple[mujoco.MjModel, list[str]]:
     """The model in a file, and remarks; ``joints`` of a model without actuators get position servos.
 

@@ -25,6 +25,7 @@ from sgimd_torch.environments.mujoco_model import (
     body_of,
     commands_box,
     context_box,
+    file_of,
     files_of,
     hand_of,
     holding,
@@ -66,7 +67,7 @@ class MujocoRobot:
     a robot. When a simulation diverges, MuJoCo adds a line to ``MUJOCO_LOG.TXT`` in the current directory.
 
     Args:
-        model: path of the MJCF or URDF file.
+        model: path of the MJCF or URDF file, or menagerie:NAME for a robot of the package mujoco-menagerie.
         outcome: comma-separated places at the end of a movement, such as site:tip, body:cup:xy, geom:ball:xz or
             joint:door.
         joints: joints that move; () for all with an actuator. Other actuators hold their initial positions.
@@ -126,7 +127,7 @@ class MujocoRobot:
         for name, value in (("settle", settle), ("noise", noise)):
             if not 0 <= value < np.inf:
                 raise ValueError(f"{name} must be finite and >= 0, got {value}")
-        path = Path(model)
+        path = file_of(model)
         self.model, self.remarks = load_model(path, joints)
         self.files = files_of(path)
         commands, self._actuators, said = commands_box(self.model, joints)

@@ -1,6 +1,7 @@
 """A robot from its model file: its outcome is where the model says, whatever the file; slips are told in a line."""
 
 import re
+import sys
 from functools import partial
 
 import numpy as np
@@ -277,6 +278,27 @@ def test_a_slip_is_told_in_one_line(here, options, said):
     with pytest.raises(ValueError, match=re.escape(said)) as raised:
         MujocoRobot(**{"model": "arm.xml", "outcome": "site:tip:xy", **options})
     assert "\n" not in str(raised.value)
+
+
+def test_a_model_of_the_menagerie_needs_its_name_alone(here, monkeypatch):
+    pytest.importorskip("mujoco_menagerie", reason="needs the package mujoco-menagerie, which no extra installs")
+    monkeypatch.setenv("MENAGERIE_ROOT", str(here / "menagerie"))
+    (here / "menagerie/robotstudio_so101").mkdir(parents=True)
+    for name in ("arm.xml", "tooth.obj"):
+        scene = here / "menagerie/robotstudio_so101" / name.replace("arm", "scene")
+        scene.write_text((here / name).read_text())
+    robot = MujocoRobot("menagerie:robotstudio_so101", outcome="site:tip:xy", **CORNERS)
+    assert [path.name for path in robot.files] == ["scene.xml", "tooth.obj"]
+    with pytest.raises(ValueError, match=r"model menagerie:robotstudio_so10: Unknown robot .* Did you mean"):
+        MujocoRobot("menagerie:robotstudio_so10", outcome="site:tip:xy")
+    with pytest.raises(ValueError, match="model menagerie:aloha: 'aloha' not found"):
+        MujocoRobot("menagerie:aloha", outcome="site:tip:xy")
+
+
+def test_without_the_package_the_menagerie_is_refused_with_what_to_install(here, monkeypatch):
+    monkeypatch.setitem(sys.modules, "mujoco_menagerie", None)
+    with pytest.raises(ValueError, match="menagerie:aloha needs a package that is not installed: pip install"):
+        MujocoRobot("menagerie:aloha", outcome="site:tip")
 
 
 def test_a_model_that_diverges_is_told(here):

@@ -51,8 +51,7 @@ class ModelCamera:
         corners = np.concatenate([_edges(robot, shot).reshape(-1, 3) for shot in shots])
         arm = [self._at(state).xpos[robot.bodies] for shot in shots for state in _filmed(shot).states[::5]]
         seen = np.concatenate([corners, *arm])
-        own = (k for k in range(self._model.ncam) if not self._model.cam_bodyid[k] and self._sees(k, seen))
-        self._camera = next(own, None) or _facing(self._model, seen)
+        self._camera = viewing(self._model, self._data, seen)
         self._far = float(np.ptp(seen, axis=0).max())
 
     def __enter__(self) -> Self:
@@ -96,16 +95,18 @@ class ModelCamera:
         mujoco.mj_forward(self._model, self._data)
         return self._data
 
-    def _sees(self, camera: int, points: Array) -> bool:
-        """Whether all of ``points`` ``(n, 3)`` m are in the picture of a camera of the model."""
-        x, y, z = ((points - self._data.cam_xpos[camera]) @ self._data.cam_xmat[camera].reshape(3, 3)).T
-        reach = -z * math.tan(math.radians(self._model.cam_fovy[camera]) / 2)  # a camera looks along its -z
-        return bool(((np.abs(y) < reach) & (np.abs(x) < WIDTH / HEIGHT * reach)).all())
 
+def viewing(model: mujoco.MjModel, data: mujoco.MjData, points: Array) -> int | mujoco.MjvCamera:
+    """A camera that sees ``points`` ``(n, 3)`` m: the first camera of the model that is fixed to the world and does.
 
-def _facing(model: mujoco.MjModel, points: Array) -> mujoco.MjvCamera:
-    """The nearest camera that sees ``points`` ``(n, 3)`` m, in the direction in which the model is first viewed."""
-    camera, view = mujoco.MjvCamera(), model.vis.global_
+    If there is none, it is the nearest camera in the direction in which MuJoCo's viewer first looks at the model.
+    """
+    for k in np.flatnonzero(model.cam_bodyid == 0).tolist():
+        x, y, z = ((points - data.cam_xpos[k]) @ data.cam_xmat[k].reshape(3, 3)).T
+        reach = -z * math.tan(math.radians(model.cam_fovy[k]) / 2)  # a camera looks along its -z
+        if ((np.abs(y) < reach) & (np.abs(x) < WIDTH / HEIGHT * reach)).all():
+            return int(k)
+    camera = mujoco.MjvCamera()
     mujoco.mjv_defaultFreeCamera(model, camera)
     turn, tilt = math.radians(camera.azimuth), math.radians(camera.elevation)
     ahead = np.array([math.cos(tilt) * math.cos(turn), math.cos(tilt) * math.sin(turn), math.sin(tilt)])
@@ -113,7 +114,7 @@ def _facing(model: mujoco.MjModel, points: Array) -> mujoco.MjvCamera:
     camera.lookat[:] = (points.min(axis=0) + points.max(axis=0)) / 2
     away = points - camera.lookat
     across, along = np.abs(away @ right) * HEIGHT / WIDTH, np.abs(away @ np.cross(right, ahead))
-    slope = FILLED * math.tan(math.radians(view.fovy) / 2)
+    slope = FILLED * math.tan(math.radians(model.vis.global_.fovy) / 2)
     camera.distance = float((np.maximum(across, along) / slope - away @ ahead).max())
     return camera
 
