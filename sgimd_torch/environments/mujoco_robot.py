@@ -42,6 +42,7 @@ EXPLORED: Final = 300  # number of random movements that find T
 REPEATED: Final = 30  # number of random movements that are executed twice to find the noise of outcomes
 MOVED: Final = 1e-3  # m or rad, shift of the measured place that counts as moved
 FEWEST: Final = 10  # number of random movements that must move the measured place
+TREMBLE: Final = 1e-6  # m or rad; an object at rest trembles less, which must not look like an effect of a movement
 _BLOCK: Final = 32  # number of movements simulated in parallel
 _STATE: Final = mujoco.mjtState.mjSTATE_FULLPHYSICS
 _FRAMES: Final = 25.0  # drawings of a movement per second
@@ -76,8 +77,8 @@ class MujocoRobot:
         displacement: whether an outcome is the shift of the place from where the movement began.
         low, high: corners of T; () for T found by random movements.
         rest: outcome of not moving; () for the outcome of a movement that holds the start.
-        outcome_noise: standard deviation of outcomes if a movement is repeated; None for what ``noise`` makes of some
-            random movements.
+        outcome_noise: standard deviation of outcomes if a movement is repeated; None for what ``noise`` makes of random
+            movements, at least 1e-6.
         durations: shortest and longest duration of a movement (s).
         n_knots: number of knots of each joint.
         settle: time (s) between the end of a movement and its outcome.
@@ -157,7 +158,7 @@ class MujocoRobot:
             corners = self._explored(still, names, path.name)
         self.outcomes = Box(corners[0], corners[1], tuple(names), self._places[0].unit)
         self.rest = read_only(still if rest else self.outcomes.clip(np.round(still, 3)))
-        self.outcome_noise = self._scatter() if outcome_noise is None else outcome_noise
+        self.outcome_noise = max(TREMBLE, self._scatter()) if outcome_noise is None else outcome_noise
         check_robot(self)
         points = [tuple(each.tolist()) for each in (self.outcomes.low, self.outcomes.high, self.rest)]
         self.found = dict(zip(self.FOUND, (*points, self.outcome_noise), strict=True))
