@@ -159,6 +159,14 @@ def expected(process: Process, covariance: Array) -> Array:
 
 
 @inner
+def prediction(process: Process, here: Array) -> tuple[Array, float]:
+    """Expected outcome of a movement with the input ``here`` ``(dim,)``, and its variance, without noise."""
+    covariance, slope = np.empty(process.inputs.shape[1]), np.empty(process.inputs.shape[1])
+    covariances(process.inputs, process.kernel, here, covariance, slope)
+    return expected(process, covariance), unknown(process, covariance)
+
+
+@inner
 def expected_error(process: Process, goal: Array, doubt: float, covariance: Array, limit: float) -> float:
     """Expected squared error, the variance times ``doubt`` included; any number above ``limit`` if it is larger."""
     error = squared_distance(expected(process, covariance), goal)
@@ -239,9 +247,9 @@ def answer(
     units: Array,
     spreads: Array,
     box: Array,
-) -> Array:
+) -> tuple[Array, Array, float]:
     """theta of the candidate with the least expected squared error; that of the nearest exemplar, unless another one is
-    clearly better.
+    clearly better. Also its expected outcome, and the standard deviation from that, noise included.
 
     Args:
         near: ``(k,)`` rows of the nearest outcomes, nearest first.
@@ -289,16 +297,15 @@ def answer(
         error, found = descend(process, thetas[row], context, goal, doubt, units, spreads, box)
         if error < least:
             least, best = error, found
-    return best.copy() if least < CLEARLY * nearest else thetas[near[0]].copy()
+    best = best.copy() if least < CLEARLY * nearest else thetas[near[0]].copy()
+    outcome, variance = prediction(process, in_lengths(best, context, units))
+    return best, outcome, np.sqrt(max(1.0, surprise) * (variance + process.variance * noise))
 
 
 @called(TABLE, TABLE, ROWS, NUMBERS, NUMBERS)
 def foretell(inputs: Array, outcomes: Array, rows: np.ndarray, here: Array, kernel: Array) -> tuple[Array, float]:
     """Expected outcome of a movement, and its variance, by the process of the movements in ``rows``."""
-    process = fitted(columns(inputs, rows), columns(outcomes, rows), kernel)
-    covariance, slope = np.empty(len(rows)), np.empty(len(rows))
-    covariances(process.inputs, kernel, here.copy(), covariance, slope)
-    return expected(process, covariance), unknown(process, covariance)
+    return prediction(fitted(columns(inputs, rows), columns(outcomes, rows), kernel), here.copy())
 
 
 @called(TABLE, TABLE, TABLE, NUMBERS, NUMBER)

@@ -59,7 +59,7 @@ class LocalProcess(Inverse):
         linear, _ = self._linear.correct(near[:NEAR], goal)
         inputs, kernels = self._inputs.keys.rows, compiled("sgimd_torch.inverses.kernels")
         alike = self._inputs.nearest(inputs[near[: kernels.STARTS]], _LEARNT)
-        theta = kernels.answer(
+        theta, expected, sd = kernels.answer(
             near,
             alike,
             inputs,
@@ -73,7 +73,7 @@ class LocalProcess(Inverse):
             self._spreads,
             memory.theta_range,
         )
-        return Estimate(theta, thetas, memory.outcomes[near], context)
+        return Estimate(theta, thetas, memory.outcomes[near], context, expected, sd)
 
     def predict(self, context: Array, theta: Array) -> Array | None:
         """Expected outcome ``(outcome_dim,)`` of ``theta``, from similar movements. While all outcomes are equal, the
