@@ -1,6 +1,7 @@
 """Recordings as people have them become demonstrations: text, LeRobot; and are checked against a robot."""
 
 import json
+import os
 import re
 
 import numpy as np
@@ -227,9 +228,16 @@ def test_recordings_that_cannot_be_used_are_named_and_left_out_when_asked(tmp_pa
 
 
 def test_folders_without_texts_and_places_without_a_file_are_refused(tmp_path, capsys):
-    for place, told in ((tmp_path, r"holds no \.csv, \.tsv, \.txt, \.dat file"), (tmp_path / "no.csv", "there is no ")):
-        assert sgimd("import", place, *NAMED.split(), "--out", tmp_path / "shown.npz") == 2
-        assert re.search(told, capsys.readouterr().err)
+    os.mkfifo(tmp_path / "pipe.npz")
+    for place, told in (
+        (".", r"holds no \.csv, \.tsv, \.txt, \.dat file"),
+        ("no.csv", r"no\.csv cannot be read or written: No such file"),
+        ("\udcff\x1b[31m\n.csv", r"'.*\\udcff\\x1b\[31m\\n\.csv' cannot be read or written: No such file"),
+        ("pipe.npz", "pipe.npz is a pipe or a device, not a file"),
+    ):
+        assert sgimd("import", tmp_path / place, *NAMED.split(), "--out", tmp_path / "shown.npz") == 2
+        said = capsys.readouterr().err
+        assert re.fullmatch(f"error: .*{told}.*\n", said), said
 
 
 def test_columns_are_checked_before_anything_is_read():
