@@ -69,7 +69,7 @@ COMMANDS = {
     "run --search nelder": r"unknown search 'nelder'; did you mean nelder-mead\? Known are nelder-mead, .*package",
     "run --environment toss:Toss --algorithm sgim-d": "Toss has no demonstrations, .* --algorithm practice",
     "run --algorithm random --environment toss:Toss --environment.noise 1": "environment toss:Toss has no such option",
-    "run --algorithm sgim-d --demonstrations nothing.npz": "nothing.npz cannot be read or written: No such file",
+    "run --algorithm sgim-d --demonstrations nothing.npz": "nothing.npz cannot be read or written",
     "run --algorithm sgim-d --demonstrations shown.csv": "shown.csv is no demonstration file: .* demonstrations import",
     "run --benchmark shown.csv": "shown.csv is no benchmark: it is not an npz file",
     "run --out shown.csv --environment planar-arm-7": "shown.csv.* cannot be made: .* a file in its place",
@@ -136,7 +136,7 @@ COMMANDS = {
     "demo --seed -1": "seed must be",
     "demo --movements 0": "movements must be",
     "demo --evaluate_at []": "--evaluate-at",
-    "demonstrations check nothing.npz --environment planar-arm-7": "nothing.npz cannot be read or written: No such file",
+    "demonstrations check nothing.npz --environment planar-arm-7": "nothing.npz cannot be read or written",
     "demo --algorithm random": "--algorithm cannot be given here",
 }
 MANY_RUNS = {  # what these say is longer: their usage, or the list of runs, comes first
