@@ -168,9 +168,10 @@ class Box:
             raise ValueError(f"Box needs corners with low < high, got {low} and {high}; were they swapped?")
         given: Any = self.names
         names = tuple(given)
-        texts = all(isinstance(each, str) for each in (*names, self.unit))
+        texts = all(isinstance(each, str) and each.isprintable() for each in (*names, self.unit))
         if isinstance(given, str) or len(names) not in (0, len(low)) or not texts:
-            raise ValueError(f"Box needs {len(low)} names and a unit, all texts, got {given} and {self.unit!r}")
+            wanted = "all texts without control characters"
+            raise ValueError(f"Box needs {len(low)} names and a unit, {wanted}, got {given!r} and {self.unit!r}")
         object.__setattr__(self, "names", names)
         for name, corner in (("low", low), ("high", high)):
             corner.flags.writeable = False
