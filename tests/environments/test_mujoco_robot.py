@@ -165,6 +165,14 @@ def test_noise_shifts_the_commands_by_its_share_of_their_range(here):
     assert robot.outcome_noise == pytest.approx(0.02 * np.pi, rel=0.3)
 
 
+def test_a_thing_that_trembles_at_rest_was_not_moved(here):
+    robot = MujocoRobot("arm.xml", outcome="body:puck:xy", **CORNERS)
+    assert robot.outcome_noise == 1e-6  # m; with 0, a learner would take the trembling for effects of its movements
+    rested = [robot.execute(NONE, steady(angle, 0), stream(0, "x")) for angle in (-1.0, -1.5, -2.0)]
+    assert np.ptp(rested, axis=0) == pytest.approx(0, abs=robot.outcome_noise)
+    check_environment(robot)
+
+
 def test_a_recording_is_translated_to_the_movement_that_was_recorded(here):
     robot = MujocoRobot("arm.xml", outcome="site:tip:xy", n_knots=6, **CORNERS)
     theta = robot.policies.sample(stream(0, "x"))
