@@ -35,7 +35,8 @@ from sgimd_torch.environments.mujoco_model import (
     path_to,
     positions,
 )
-from sgimd_torch.environments.protocol import Primitive, SimulationError, Sketch, check_movement, check_robot
+from sgimd_torch.environments.protocol import Primitive, SimulationError, check_movement, check_robot
+from sgimd_torch.environments.sketch import Sketch
 from sgimd_torch.spaces import Array, Box, check_count, check_point, check_rng, read_only, stream
 
 EXPLORED: Final = 300  # number of random movements that find T

@@ -14,11 +14,11 @@ from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.protocol import (
     BatchEnvironment,
     SimulationError,
-    Sketch,
     check_movement,
     check_recording,
     execute_many,
 )
+from sgimd_torch.environments.sketch import Sketch
 from sgimd_torch.spaces import Array, Box, stream
 
 NO_CONTEXT = np.empty(0)

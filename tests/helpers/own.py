@@ -3,7 +3,8 @@
 MODULE = '''
 import numpy as np
 from sgimd_torch import Box
-from sgimd_torch.environments.protocol import Sketch, check_movement
+from sgimd_torch.environments.protocol import check_movement
+from sgimd_torch.environments.sketch import Sketch
 
 class Slider:
     """A slider: theta in [0, 1] is its place in each dimension, which a context, if there is one, shifts."""

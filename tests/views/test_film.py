@@ -14,7 +14,7 @@ from runs import ROOT
 from sgimd_torch.environments.fishing_rod import HOLD, FishingRod
 from sgimd_torch.environments.mujoco_robot import MujocoRobot
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.environments.protocol import Sketch
+from sgimd_torch.environments.sketch import Sketch
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.record import Record
 from sgimd_torch.runs import command_line

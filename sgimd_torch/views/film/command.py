@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from sgimd_torch.environments.protocol import Sketch
+from sgimd_torch.environments.sketch import Sketch
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.figures.names import colour, label
 from sgimd_torch.runs.build import RunParts, build

@@ -21,7 +21,7 @@ from imageio_ffmpeg import get_ffmpeg_exe
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from sgimd_torch.environments.protocol import Trace
+from sgimd_torch.environments.sketch import Trace
 from sgimd_torch.files import replacing
 from sgimd_torch.spaces import Array
 

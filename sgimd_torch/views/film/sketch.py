@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.patches import Rectangle
 from PIL import Image
 
-from sgimd_torch.environments.protocol import Sketch
+from sgimd_torch.environments.sketch import Sketch
 from sgimd_torch.figures.axes import goal_rings
 from sgimd_torch.spaces import Array, Box
 from sgimd_torch.views.film.panel import blank, pixels
