@@ -264,12 +264,18 @@ class Failure(NamedTuple):
 
 class Estimate(NamedTuple):
     """The answer of an inverse model to a goal in a ``context`` ``(context_dim,)``: ``theta`` ``(theta_dim,)``, and
-    exemplars at which a search may begin, ``thetas`` ``(k, theta_dim)`` with ``outcomes`` ``(k, outcome_dim)``."""
+    exemplars at which a search may begin, ``thetas`` ``(k, theta_dim)`` with ``outcomes`` ``(k, outcome_dim)``.
+
+    ``expected`` ``(outcome_dim,)`` is the outcome that the inverse model expects of theta, and ``sd`` the standard
+    deviation from it in each dimension, noise included, in the unit of T; None: the inverse model does not know.
+    """
 
     theta: Array
     thetas: Array
     outcomes: Array
     context: Array = np.zeros(0)
+    expected: Array | None = None
+    sd: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

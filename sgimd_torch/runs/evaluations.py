@@ -32,7 +32,10 @@ class Evaluations:
         config, environment, benchmark, learner: parts of the run.
         inverses: inverse models to evaluate, by name, the run's own first; all of them read the learner's memory.
         record: record of the run; movements of an evaluation are not recorded.
-        between: function to call before each movement of an evaluation; it may raise `KeyboardInterrupt`.
+        between: function to call between movements of an evaluation; it may raise `KeyboardInterrupt`.
+
+    Attributes:
+        made: number of movements of all evaluations so far, recorded ones included.
     """
 
     config: Config
@@ -51,16 +54,17 @@ class Evaluations:
             movements: {word: _evaluation(np.array(each, dtype=np.float64)) for word, each in by_word.items()}
             for movements, by_word in rows.items()
         }
+        self.made = sum(map(self.size, self._found))
 
     @property
     def last(self) -> Evaluation | None:
         """The last evaluation of the run's own inverse model, None if there is none."""
         return self._found[max(self._found)][OWN] if self._found else None
 
-    @property
-    def made(self) -> int:
-        """Number of evaluations so far, recorded ones included."""
-        return len(self._found)
+    def size(self, movements: int) -> int:
+        """Number of movements of the evaluation after this number of ``movements``."""
+        different = len(set(map(id, self.inverses.values())))
+        return len(self.benchmark.goals) * (different + self._repeats(movements))
 
     def after(self, movements: int) -> ByInverse | None:
         """The recorded evaluation after this number of movements, else a new evaluation of the present learner.
@@ -69,6 +73,7 @@ class Evaluations:
         """
         if movements not in self._found and len(self.learner.memory):
             self._found[movements] = self._evaluate(movements)
+            self.made += self.size(movements)
             self._write(movements, self._found[movements])
         return self._found.get(movements)
 
@@ -78,7 +83,7 @@ class Evaluations:
         At each goal the noise is the same for all inverse models. The noise floor is measured for the run's own model.
         """
         config, (own, *others) = self.config, self.inverses
-        repeats = config.repeats if config.due(movements, config.floors) else 0
+        repeats = self._repeats(movements)
         judged: tuple[Any, ...] = self.environment, self.benchmark.goals, config.seed, movements
         how: dict[str, Any] = {"between": self.between}
         found = {own: evaluate(self.inverses[own], *judged, repeats=repeats, **how)}
@@ -86,6 +91,9 @@ class Evaluations:
             same = self.inverses[word] is self.inverses[own]
             found[word] = found[own].without_noise if same else evaluate(self.inverses[word], *judged, repeats=0, **how)
         return found
+
+    def _repeats(self, movements: int) -> int:
+        return self.config.repeats if self.config.due(movements, self.config.floors) else 0
 
     def _write(self, movements: int, found: ByInverse) -> None:
         """Add evaluations to the record, and the current regions of the goal model."""
