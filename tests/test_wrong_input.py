@@ -71,7 +71,7 @@ COMMANDS = {
     "run --search nelder": r"unknown search 'nelder'; did you mean nelder-mead\? Known are nelder-mead, .*package",
     "run --environment toss:Toss --algorithm sgim-d": "Toss has no demonstrations, .* --algorithm practice",
     "run --algorithm random --environment toss:Toss --environment.noise 1": "environment toss:Toss has no such option",
-    "run --algorithm sgim-d --demonstrations nothing.npz": "nothing.npz cannot be read or written: No such file",
+    "run --algorithm sgim-d --demonstrations nothing.npz": "nothing.npz cannot be read or written",
     "run --algorithm sgim-d --demonstrations shown.csv": "shown.csv is no demonstration file: .* demonstrations import",
     "run --benchmark shown.csv": "shown.csv is no benchmark: it is not an npz file",
     "run --out shown.csv --environment planar-arm-7": "shown.csv.* cannot be made: .* a file in its place",
@@ -138,7 +138,7 @@ COMMANDS = {
     "demo --seed -1": "seed must be",
     "demo --movements 0": "movements must be",
     "demo --evaluate_at []": "--evaluate-at",
-    "demonstrations check nothing.npz --environment planar-arm-7": "there is no nothing.npz",
+    "demonstrations check nothing.npz --environment planar-arm-7": "nothing.npz cannot be read or written",
     "demo --algorithm random": "--algorithm cannot be given here",
 }
 MANY_RUNS = {  # what these say is longer: their usage, or the list of runs, comes first
@@ -227,6 +227,7 @@ CALLS = {
     "one goal": (lambda: evaluate(learner().inverse, ARM, np.zeros(2), 0, 0), "goals must have shape"),
     "corners swapped": (lambda: Box(np.ones(2), np.zeros(2)), "corners with low < high, .* were they swapped?"),
     "a text for names": (lambda: Box(np.zeros(2), np.ones(2), names="xy"), "Box needs 2 names"),
+    "an escape code in a name": (lambda: Box.cube(0, 1, 1, names=("x\x1b[31m",)), "without control characters"),
     "a seed for a teacher": (lambda: PeriodicTeacher([SHOWN], 0), "rng must be a numpy.random.Generator, got int"),
     "no return": (
         lambda: execute_many(Silent(5), np.zeros((3, 0)), np.full((3, 5), 0.5), [stream(0, "a", k) for k in range(3)]),

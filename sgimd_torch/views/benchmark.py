@@ -25,7 +25,7 @@ from pathlib import Path
 import numpy as np
 
 from sgimd_torch.evaluation import TILES, Benchmark, save_benchmark, tile_goals, tile_side, tile_sides
-from sgimd_torch.runs.process import parser_of, printable, say
+from sgimd_torch.runs.process import parser_of, say
 from sgimd_torch.runs.read import Run, find_runs, read_run
 from sgimd_torch.spaces import Box, check_count, stream
 
@@ -53,7 +53,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         )
     save_benchmark(options.out, Benchmark(name, goals, side))
     n, made = len(goals), f"{len(outcomes)} movements of {len(runs)} run{'s' * (len(runs) > 1)}"
-    print(printable(f"{n} goals, on tiles of {tile} reached by {made}: {options.out}"))
+    print(f"{n} goals, on tiles of {tile} reached by {made}: {options.out}")
     (finest, *_, largest), asked = tile_sides(outcomes, box), f"{options.tiles} goals were requested, and {n} made"
     if n > 2 * options.tiles and side > 0.9 * largest:
         say(f"{asked}: no tiles are larger than {box.amount(largest)}; runs that reach less of T give fewer")

@@ -143,11 +143,13 @@ def test_what_cannot_be_made_is_refused_in_a_line_and_nothing_is_written(own, ca
     assert sorted(path for path in own.rglob("*") if "__pycache__" not in str(path)) == before
 
 
-def test_a_unit_with_escape_codes_does_not_reach_the_terminal(own, capsys):
+def test_a_unit_with_escape_codes_is_refused_and_does_not_reach_the_terminal(own, capsys):
     run("--environment", "sliders:Slider2")
     found = read_run("runs/random/seed-000")
     spaces = {name: [box.low.tolist(), box.high.tolist(), box.names, "\x1b[31m"] for name, box in found.spaces.items()}
     settle(Path("runs/random/seed-000"), spaces=spaces)
     capsys.readouterr()
-    goals_of("runs", "--tiles", 20)
-    assert "\x1b" not in capsys.readouterr().out
+    assert command(main, ["runs", "--out", "goals.npz"]) == 2
+    said = capsys.readouterr()
+    assert "\x1b" not in said.out + said.err
+    assert "without control characters" in said.err
