@@ -41,6 +41,7 @@ LIBRARIES = {  # rooms or single files that may import a library, by library
         "views/film",
         "teach",
     },
+    "mujoco_menagerie": {"environments/mujoco_model"},
     "torch": {"forward_model"},
     "lightning": {"forward_model"},
     "safetensors": {"forward_model"},
