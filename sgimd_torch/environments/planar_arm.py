@@ -79,7 +79,7 @@ class PlanarArm:
         directions = np.cumsum(times**2 * (3 - 2 * times) * angles, axis=1) + context.sum()
         links = 1 / len(theta) * np.stack([np.cos(directions), np.sin(directions)], axis=2)
         joints = np.concatenate([np.zeros((_STEPS, 1, 2)), np.cumsum(links, axis=1)], axis=1)
-        return Sketch(self._end(context, angles), _STEP, joints)
+        return Sketch(self._end(context, angles), _STEP, [joints])
 
     def angles(self, theta: ArrayLike) -> Array:
         """``(..., n_joints)`` rad, the joint angles of ``theta`` ``(..., n_joints)`` without noise.

@@ -8,7 +8,7 @@ Section 2.1 of Nguyen & Oudeyer (2014): M(c, theta) = tau. An environment of you
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Protocol, runtime_checkable
@@ -116,10 +116,18 @@ class HasPrimitive(Protocol):
 
 @runtime_checkable
 class FromFiles(Protocol):
-    """An environment that is read from files, whose checksums a run keeps; ``remarks`` are sentences for the user."""
+    """An environment that is read from files.
+
+    Attributes:
+        files: files whose checksums a run keeps.
+        remarks: sentences for the user.
+        found: values of the options that the environment finds by movements if they are not given. A run keeps them in
+            its settings, so they are found once. The class lists the names of these options as ``FOUND``.
+    """
 
     files: Sequence[Path]
     remarks: Sequence[str]
+    found: Mapping[str, Any]
 
 
 def primitive_of(environment: Environment) -> Primitive:
@@ -152,8 +160,9 @@ class Sketch:
         outcome: ``(outcome_dim,)``, equal to the outcome of ``execute`` with an equal random stream. Its first two
             dimensions are x and y in the drawing; if it has one dimension, y is 0.
         step: time between two drawings (s).
-        chains: ``(n_steps, n_points, 2)``, points of the robot, which the film joins by lines; a single point is drawn
-            as a ball. The film also shows the path of the last point.
+        chains: arrays ``(n_steps, n_points, 2)``, one for each chain of the robot and for each object: points that the
+            film joins by lines, or a single point, which it draws as a ball. The film also shows the path of each
+            chain's last point.
 
     Raises:
         ValueError: an array has another shape or is not finite, or the step is not above 0.
@@ -161,22 +170,31 @@ class Sketch:
 
     outcome: Array
     step: float
-    chains: Array
+    chains: Sequence[Array]
 
     def __post_init__(self) -> None:
-        for name, axes, wanted in (("outcome", 1, "(outcome_dim,)"), ("chains", 3, "(n_steps, n_points, 2)")):
-            value = np.asarray(getattr(self, name))
-            numbers = value.size > 0 and value.dtype.kind in "iuf" and np.isfinite(value).all()
-            if not numbers or value.ndim != axes or (name == "chains" and value.shape[2] != 2):
-                raise ValueError(f"{name} of a Sketch must be finite numbers {wanted}, got shape {value.shape}")
-            object.__setattr__(self, name, read_only(value.astype(np.float64)))
+        object.__setattr__(self, "outcome", _drawn("outcome", self.outcome, "(outcome_dim,)", 1))
+        chains = tuple(_drawn("each chain", each, "(n_steps, n_points, 2)", 3) for each in self.chains)
+        shapes = [each.shape for each in chains]
+        if len({shape[0] for shape in shapes}) != 1 or any(shape[2] != 2 for shape in shapes):
+            raise ValueError(
+                f"chains of a Sketch must be one array (n_steps, n_points, 2) or more, got shapes {shapes}"
+            )
+        object.__setattr__(self, "chains", chains)
         if not 0 < self.step < np.inf:
             raise ValueError(f"step of a Sketch must be above 0 s, got {self.step}")
 
     @property
     def landed(self) -> float:
         """Duration (s) of the movement."""
-        return self.step * (len(self.chains) - 1)
+        return self.step * (len(self.chains[0]) - 1)
+
+
+def _drawn(name: str, given: ArrayLike, wanted: str, axes: int) -> Array:
+    value = np.asarray(given)
+    if value.size == 0 or value.dtype.kind not in "iuf" or not np.isfinite(value).all() or value.ndim != axes:
+        raise ValueError(f"{name} of a Sketch must be finite numbers {wanted}, got shape {value.shape}")
+    return read_only(value.astype(np.float64))
 
 
 Tracer = Callable[[Array, Array, np.random.Generator], Trace]
