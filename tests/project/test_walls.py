@@ -33,7 +33,7 @@ LIBRARIES = {  # rooms or single files that may import a library, by library
     "scipy": ROW.keys() - {"spaces"},
     "lazy_loader": {"__init__"},
     "faiss": {"memory/neighbours"},
-    "numba": {"memory/compiled", "memory/scan", "inverses/jit", "inverses/kernels"},
+    "numba": {"memory/compiled", "memory/scan", "memory/jit", "inverses/kernels"},
     "mujoco": {
         "environments/rod_physics",
         "environments/mujoco_model",
