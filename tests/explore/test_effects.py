@@ -15,7 +15,7 @@ from sgimd_torch.explore.widening import Widening
 from sgimd_torch.inverses.among_effects import AmongEffects
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.memory import Memory
-from sgimd_torch.runs.tasks.robots import toy_benchmark
+from sgimd_torch.runs.tasks.toys import toy_benchmark
 from sgimd_torch.session import run
 from worlds import NO_CONTEXT, problem
 
