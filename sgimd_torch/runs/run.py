@@ -10,11 +10,12 @@ import time
 import traceback
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from functools import partial
 from typing import Final, Protocol, Self
 
 from sgimd_torch.environments.protocol import FAILURES, SimulationError
-from sgimd_torch.evaluation import Evaluation
+from sgimd_torch.evaluation import Evaluation, expected_error
 from sgimd_torch.record import ReplayError, RunError
 from sgimd_torch.runs.at_once import executing
 from sgimd_torch.runs.build import RunParts
@@ -22,9 +23,10 @@ from sgimd_torch.runs.directory import open_run
 from sgimd_torch.runs.evaluations import Evaluations
 from sgimd_torch.runs.process import Failed, Progress, Stopped, Stopping, say
 from sgimd_torch.session import NoOutcomeError, reason_of, run
-from sgimd_torch.spaces import Episode
+from sgimd_torch.spaces import Episode, stream
 
 TOLD: Final = 3  # first failures, with a message each; later ones are only counted
+LOOK_EVERY: Final = 50  # movements between two looks at the expected error, until they are a tenth of all movements
 COMMIT_EVERY: Final = 1.0  # s between two commits; a killed run loses the movements since the last commit
 
 
@@ -130,7 +132,9 @@ class Life:
             if last.failed.any():
                 found += f" ({last.failed.sum()} of {len(last.failed)} movements of the evaluation failed)"
         failed = f" ({self.failed} failed)" if self.failed else ""
-        return f"{self.parts.config.directory}: {self.movements} movements{failed}, {found}"
+        met = self.record.about["met"]
+        early = f", ended early as it expected {self.parts.environment.outcomes.amount(met[1], '.4f')}" if met else ""
+        return f"{self.parts.config.directory}: {self.movements} movements{failed}, {found}{early}"
 
     def go_on(self, stopping: Stopping) -> None:
         """Make all movements, or stop after the movement during which ``stopping`` has heard a signal."""
@@ -173,6 +177,8 @@ class Life:
             for episode in iter(following, None):
                 self._after(episode)
                 yield episode
+                if self._met():
+                    return
 
     @property
     def _all_told(self) -> bool:
@@ -238,6 +244,27 @@ class Life:
             self._begin()
         if not self.replaying and time.monotonic() - self._committed >= COMMIT_EVERY:
             self.commit()
+
+    def _met(self) -> bool:
+        """Whether the learner expects errors as small as --until says; then the run ends with an evaluation."""
+        config, now = self.parts.config, self.movements
+        if config.until is None or self.replaying or not self._all_told or now >= config.movements:
+            return False
+        moments = range(0, now + 1, LOOK_EVERY * max(1, now // (10 * LOOK_EVERY)))[1:]
+        if not (config.due(now, moments) and len(self.parts.learner.memory)):
+            return False
+        if self.record.about["met"] is None:
+            known = self.parts.task.benchmark is not None or config.benchmark is not None
+            goals = self.parts.benchmark.goals if known else None
+            with self.seconds.of("learner"):
+                expected = expected_error(self.parts.learner.inverse, goals, stream(config.seed, "until", now))
+            if not expected <= config.until:
+                return False
+            self.record.settle(met=[now, expected])
+        self.evaluations.config = replace(config, movements=now)
+        if config.evaluations:
+            self._evaluate()
+        return True
 
     def _evaluate(self) -> None:
         with self.seconds.of("evaluation"):
