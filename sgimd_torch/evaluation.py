@@ -197,7 +197,7 @@ def evaluate(
         given = environment.contexts.check("context", context)
         contexts = np.broadcast_to(given, (len(goals), environment.contexts.dim))
     answers = inverse.answer_many(contexts, goals)
-    thetas, expected = np.stack([each.theta for each in answers]), _expected(answers, goals)
+    thetas, expected = np.stack([each.theta for each in answers]), expected_errors(answers, goals)
     copies = np.tile(thetas, (1 + repeats, 1))  # repeats come last, so that errors do not depend on their number
     landed = _landed(environment, np.tile(contexts, (1 + repeats, 1)), copies, seed, f"evaluation {step}", between)
     landed = landed.reshape(1 + repeats, *goals.shape)
@@ -211,25 +211,8 @@ def evaluate(
     return Evaluation(np.linalg.norm(reached - goals, axis=1), thetas, outcomes, scatter, contexts, failed, expected)
 
 
-def expected_error(inverse: Inverse, goals: Array | None, rng: np.random.Generator) -> float:
-    """Mean error that an inverse model expects at ``goals``, each in a remembered context; nothing is executed.
-
-    Args:
-        inverse: inverse model, whose ``answer_many`` is called; its memory must not be empty.
-        goals: ``(n, outcome_dim)``, in the unit of T; None: one in each tile of T with two remembered outcomes or more.
-        rng: random stream of contexts and goals.
-
-    Returns:
-        Mean error, in the unit of T; NaN: there are no goals, or the inverse model does not say how sure it is.
-    """
-    memory, box = inverse.problem.memory, inverse.problem.outcomes
-    if goals is None:
-        goals = tile_goals(memory.outcomes, box, tile_side(memory.outcomes, box), rng)
-    contexts = memory.contexts[rng.integers(len(memory), size=len(goals))]
-    return float(_expected(inverse.answer_many(contexts, goals), goals).mean()) if len(goals) else float("nan")
-
-
-def _expected(answers: Sequence[Estimate], goals: Array) -> Array:
+def expected_errors(answers: Sequence[Estimate], goals: Array) -> Array:
+    """Expected errors ``(n,)`` of answers to ``goals`` ``(n, outcome_dim)``; NaN: not known."""
     return np.array([each.expected_error(goal) for each, goal in zip(answers, goals, strict=True)])
 
 

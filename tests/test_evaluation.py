@@ -14,13 +14,13 @@ from sgimd_torch.evaluation import (
     Evaluation,
     contexts_of_goals,
     evaluate,
-    expected_error,
     load_benchmark,
     save_benchmark,
     tile_goals,
 )
 from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.parts import Inverse
+from sgimd_torch.runs.until import expected_error
 from sgimd_torch.spaces import Array, Box, Estimate, stream
 from worlds import NO_CONTEXT, executed, problem
 

@@ -15,7 +15,7 @@ from functools import partial
 from typing import Final, Protocol, Self
 
 from sgimd_torch.environments.protocol import FAILURES, SimulationError
-from sgimd_torch.evaluation import Evaluation, expected_error
+from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.record import ReplayError, RunError
 from sgimd_torch.runs.at_once import executing
 from sgimd_torch.runs.build import RunParts
@@ -23,10 +23,9 @@ from sgimd_torch.runs.directory import open_run
 from sgimd_torch.runs.evaluations import Evaluations
 from sgimd_torch.runs.process import Failed, Progress, Stopped, Stopping, say
 from sgimd_torch.session import NoOutcomeError, reason_of, run
-from sgimd_torch.spaces import Episode, stream
+from sgimd_torch.spaces import Episode
 
 TOLD: Final = 3  # first failures, with a message each; later ones are only counted
-LOOK_EVERY: Final = 50  # movements between two looks at the expected error, until they are a tenth of all movements
 COMMIT_EVERY: Final = 1.0  # s between two commits; a killed run loses the movements since the last commit
 
 
@@ -177,7 +176,7 @@ class Life:
             for episode in iter(following, None):
                 self._after(episode)
                 yield episode
-                if self._met():
+                if self._ends_early():
                     return
 
     @property
@@ -245,26 +244,19 @@ class Life:
         if not self.replaying and time.monotonic() - self._committed >= COMMIT_EVERY:
             self.commit()
 
-    def _met(self) -> bool:
-        """Whether the learner expects errors as small as --until says; then the run ends with an evaluation."""
-        config, now = self.parts.config, self.movements
-        if config.until is None or self.replaying or not self._all_told or now >= config.movements:
+    def _ends_early(self) -> bool:
+        """Whether --until ends the run now; then there is a last evaluation."""
+        config = self.parts.config
+        if config.until is None or self.replaying or not self._all_told or self.movements >= config.movements:
             return False
-        moments = range(0, now + 1, LOOK_EVERY * max(1, now // (10 * LOOK_EVERY)))[1:]
-        if not (config.due(now, moments) and len(self.parts.learner.memory)):
-            return False
-        if self.record.about["met"] is None:
-            known = self.parts.task.benchmark is not None or config.benchmark is not None
-            goals = self.parts.benchmark.goals if known else None
-            with self.seconds.of("learner"):
-                expected = expected_error(self.parts.learner.inverse, goals, stream(config.seed, "until", now))
-            if not expected <= config.until:
-                return False
-            self.record.settle(met=[now, expected])
-        self.evaluations.config = replace(config, movements=now)
-        if config.evaluations:
+        from sgimd_torch.runs.until import ends_now  # loaded here, as few runs end early
+
+        with self.seconds.of("learner"):
+            ends = ends_now(self.parts, self.record, self.movements)
+        if ends and config.evaluations:
+            self.evaluations.config = replace(config, movements=self.movements)
             self._evaluate()
-        return True
+        return ends
 
     def _evaluate(self) -> None:
         with self.seconds.of("evaluation"):
