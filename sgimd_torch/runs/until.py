@@ -11,25 +11,12 @@ from typing import Final
 import numpy as np
 
 from sgimd_torch.evaluation import expected_errors, tile_goals, tile_side
-from sgimd_torch.inverses.among_effects import AmongEffects
-from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.parts import Inverse
 from sgimd_torch.record import Record
 from sgimd_torch.runs.build import RunParts
 from sgimd_torch.spaces import Array, stream
 
 EVERY: Final = 50  # number of movements from look to look, until it is a tenth of all movements
-
-
-def check_sure(inverse: Inverse) -> None:
-    """Refuse an inverse model that does not say how sure it is.
-
-    Raises:
-        ValueError: it expects no errors.
-    """
-    if not isinstance(inverse, LocalProcess | AmongEffects):
-        name = type(inverse).__name__
-        raise ValueError(f"--until needs an inverse model that says how sure it is, such as process; {name} does not")
 
 
 def ends_now(parts: RunParts, record: Record, movements: int) -> bool:
