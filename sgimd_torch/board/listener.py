@@ -49,7 +49,7 @@ class BoardListener(EventFile):
         self._space: Box = parts.environment.outcomes
         self._benchmark: Benchmark = parts.benchmark
         self._behaviour = Behaviour(parts.learner.problem.tolerance)
-        self._movements = self._drawn_at = 0
+        self._movements = self._drawn_at = self._changes = 0
         self._explained: set[str] = set()
         for each in summary.hparams(hparams_of(parts.config), {METRIC: math.nan})[:2]:  # the third marks the end
             self.add(0, each)
@@ -64,6 +64,9 @@ class BoardListener(EventFile):
             if not replayed:
                 self._scalars({f"time/{name.removeprefix('seconds_')}": s for name, s in self._seconds().items()})
         self._scalars(self._curves())
+        for change in self._learner.changes[self._changes :]:
+            self.add(self._movements, summary.text("about/changes", str(change)))
+        self._changes = len(self._learner.changes)
 
     def evaluated(self, movements: int, found: Mapping[str, Evaluation]) -> None:
         """Show an evaluation; of inverse models other than the run's own, show only the mean error.

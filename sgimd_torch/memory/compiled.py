@@ -43,8 +43,8 @@ def compiled(name: str) -> ModuleType:
 
 def compile_all() -> None:
     """Compile all functions that are not in the cache yet, in one process for each module."""
-    names = ("sgimd_torch.inverses.kernels", "sgimd_torch.inverses.linear_kernel", "sgimd_torch.memory.scan")
-    programs = [f"from {__name__} import compiled; compiled({name!r})" for name in names]
+    names = ("inverses.kernels", "inverses.linear_kernel", "memory.scan", "changes.kernels")
+    programs = [f"from {__name__} import compiled; compiled('sgimd_torch.{name}')" for name in names]
     _tell()
     running = [subprocess.Popen([sys.executable, "-c", each], stderr=subprocess.PIPE, text=True) for each in programs]
     for each in running:

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from sgimd_torch.catalogue import called, function_of, load_word
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.evaluation import Benchmark
+from sgimd_torch.files import checksum
 from sgimd_torch.learner import Learner
 from sgimd_torch.learner.requests import Demonstrator
 from sgimd_torch.parts import Inverse, Teacher
@@ -31,7 +33,6 @@ class RunParts:
         learner: learner, freshly built.
         teacher: teacher who demonstrates without being asked; None: no teacher.
         teachers: teachers who are asked, by name.
-        answers: inverse models for evaluations, by name; the run's own inverse model comes first.
         benchmark: goals of evaluations.
         data: checksums of the files that were read.
         notes: messages for the user.
@@ -42,7 +43,6 @@ class RunParts:
     learner: Learner
     teacher: Teacher | None
     teachers: Mapping[str, Demonstrator]
-    answers: dict[str, Inverse]
     benchmark: Benchmark
     data: dict[str, str | None]
     notes: Sequence[str]
@@ -51,6 +51,11 @@ class RunParts:
     def environment(self) -> Environment:
         """Robot of the task."""
         return self.task.environment
+
+    @property
+    def answers(self) -> dict[str, Inverse]:
+        """Inverse models for evaluations, by name, the run's own first; after a change of the robot they are others."""
+        return _answers(self.config, self.learner)
 
 
 def build(config: Config) -> RunParts:
@@ -84,23 +89,30 @@ def build(config: Config) -> RunParts:
             teachers[word] = Demonstrator.of(make, demonstrations, stream(config.seed, f"teacher {word}"))
         if teachers:
             shown["teachers"] = teachers
+    begin_with_crc32 = None
+    if config.begin_with is not None:
+        from sgimd_torch.runs.past import past_of  # few runs begin with a past
+
+        shown["prior"] = past_of(config.begin_with, task.environment)
+        notes = [*notes, f"begins with {len(shown['prior'])} movements of {config.begin_with}, as far as they help"]
+        begin_with_crc32 = checksum(config.begin_with)
     algorithm = f"algorithm {config.algorithm}"
     learner = called(algorithm, config.constructor(ALGORITHM), task.environment, config.seed, **shown)
     if not isinstance(learner, Learner):
         raise ValueError(f"{algorithm} must return a Learner, got a {type(learner).__name__}")
-    answers = {OWN: learner.inverse}
-    for word in config.evaluated_by[1:]:
-        learnt_with = config.values.get("inverse") == word
-        answers[word] = learner.inverse if learnt_with else Inverse.of(load_word("inverse", word), learner.problem)
+    _answers(config, learner)  # made now, so that their remarks are among the notes
     return RunParts(
         config=config,
         task=task,
         learner=learner,
         teacher=teacher,
         teachers=teachers,
-        answers=answers,
         benchmark=benchmark,
-        data={"demonstrations_crc32": demonstrations_crc32, "benchmark_crc32": benchmark_crc32},
+        data={
+            "demonstrations_crc32": demonstrations_crc32,
+            "benchmark_crc32": benchmark_crc32,
+            "begin_with_crc32": begin_with_crc32,
+        },
         notes=[*notes, *learner.problem.remarks],
     )
 
@@ -113,6 +125,15 @@ def task_of(config: Config) -> Task:
     """
     task = called(f"environment {config['environment']}", config.constructor("environment"))
     return task if isinstance(task, Task) else Task(task)
+
+
+def _answers(config: Config, learner: Learner) -> dict[str, Inverse]:
+    problem, found = learner.problem, {OWN: learner.inverse}
+    for word in config.evaluated_by[1:]:
+        make = partial(Inverse.of, load_word("inverse", word), problem)
+        learnt_with = config.values.get("inverse") == word
+        found[word] = learner.inverse if learnt_with else problem.shared(f"answer {word}", make)
+    return found
 
 
 def _needs_demonstrations(make: Callable[..., Any]) -> bool:

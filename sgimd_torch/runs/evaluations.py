@@ -1,6 +1,6 @@
 """Evaluations of a run's inverse models: those in its record, and new ones, which are added to the record.
 
-evaluations = Evaluations(config, arm, benchmark, learner, {"own": learner.inverse}, record)
+evaluations = Evaluations(build(config), record)
 evaluations.after(500)["own"].mean_error
 """
 
@@ -12,13 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from sgimd_torch.environments.protocol import Environment
-from sgimd_torch.evaluation import Benchmark, Evaluation, evaluate
+from sgimd_torch.evaluation import Evaluation, evaluate
 from sgimd_torch.goals.regions import Region
-from sgimd_torch.learner import Learner
-from sgimd_torch.parts import Inverse
 from sgimd_torch.record import Record
-from sgimd_torch.runs.config import OWN, Config
+from sgimd_torch.runs.build import RunParts
+from sgimd_torch.runs.config import OWN
 
 ByInverse = Mapping[str, Evaluation]
 """The evaluation of each inverse model, by name, the run's own inverse model first."""
@@ -29,17 +27,12 @@ class Evaluations:
     """All evaluations of a run, by the number of movements before each one.
 
     Args:
-        config, environment, benchmark, learner: parts of the run.
-        inverses: inverse models to evaluate, by name, the run's own first; all of them read the learner's memory.
+        parts: parts of the run; their ``answers`` are evaluated.
         record: record of the run; movements of an evaluation are not recorded.
         between: function to call before each movement of an evaluation; it may raise `KeyboardInterrupt`.
     """
 
-    config: Config
-    environment: Environment
-    benchmark: Benchmark
-    learner: Learner
-    inverses: Mapping[str, Inverse]
+    parts: RunParts
     record: Record
     between: Callable[[], object] = bool
 
@@ -67,7 +60,7 @@ class Evaluations:
 
         The result is None while memory is empty: the observing learner remembers nothing before a demonstration.
         """
-        if movements not in self._found and len(self.learner.memory):
+        if movements not in self._found and len(self.parts.learner.memory):
             self._found[movements] = self._evaluate(movements)
             self._write(movements, self._found[movements])
         return self._found.get(movements)
@@ -77,26 +70,27 @@ class Evaluations:
 
         At each goal the noise is the same for all inverse models. The noise floor is measured for the run's own model.
         """
-        config, (own, *others) = self.config, self.inverses
+        config, inverses = self.parts.config, self.parts.answers
+        own, *others = inverses
         repeats = config.repeats if config.due(movements, config.floors) else 0
-        judged: tuple[Any, ...] = self.environment, self.benchmark.goals, config.seed, movements
+        judged: tuple[Any, ...] = self.parts.environment, self.parts.benchmark.goals, config.seed, movements
         how: dict[str, Any] = {"between": self.between}
-        found = {own: evaluate(self.inverses[own], *judged, repeats=repeats, **how)}
+        found = {own: evaluate(inverses[own], *judged, repeats=repeats, **how)}
         for word in others:
-            same = self.inverses[word] is self.inverses[own]
-            found[word] = found[own].without_noise if same else evaluate(self.inverses[word], *judged, repeats=0, **how)
+            same = inverses[word] is inverses[own]
+            found[word] = found[own].without_noise if same else evaluate(inverses[word], *judged, repeats=0, **how)
         return found
 
     def _write(self, movements: int, found: ByInverse) -> None:
         """Add evaluations to the record, and the current regions of the goal model."""
         for word, each in found.items():
-            errors, met = each.errors, each.met(self.benchmark.side / 2)
+            errors, met = each.errors, each.met(self.parts.benchmark.side / 2)
             summary = each.mean_error, np.median(errors), np.quantile(errors, 0.9), each.noise_floor, met
             self.record.add_rows("evaluations", [(movements, word, *summary)])
             columns = zip(errors.tolist(), each.scatter.tolist(), each.failed.astype(int), each.contexts, strict=True)
             rows = [(movements, word, k, *more, *context) for k, (*more, context) in enumerate(columns)]
             self.record.add_rows("errors", rows)
-        self.record.add_rows("regions", [(movements, *_fields(region)) for region in self.learner.regions])
+        self.record.add_rows("regions", [(movements, *_fields(region)) for region in self.parts.learner.regions])
 
 
 def _evaluation(numbers: np.ndarray) -> Evaluation:

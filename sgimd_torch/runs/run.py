@@ -15,6 +15,7 @@ from typing import Final, Protocol, Self
 
 from sgimd_torch.environments.protocol import FAILURES, SimulationError
 from sgimd_torch.evaluation import Evaluation
+from sgimd_torch.learner.events import Event, Kind
 from sgimd_torch.record import ReplayError, RunError
 from sgimd_torch.runs.at_once import executing
 from sgimd_torch.runs.build import RunParts
@@ -84,8 +85,8 @@ class Life:
         say(*parts.notes, *notes)
         self.movements, self.recorded, self.failed = 0, self.record.movements, 0
         self.seconds = Seconds(self.record.about.get("seconds", {}))
-        judged = parts.config, parts.environment, parts.benchmark, parts.learner, parts.answers
-        self.evaluations = Evaluations(*judged, self.record)
+        self.evaluations = Evaluations(parts, self.record)
+        parts.learner.listeners.append(self._hear)
         self.listeners: list[Listener] = [each.listener(self) for each in parts.learner.problem.trained]
         if parts.config.board:
             from sgimd_torch.board.listener import BoardListener  # loaded here, as most runs have no board
@@ -202,6 +203,10 @@ class Life:
         if stopping.heard and self._all_told:
             self._keep()
             raise Stopped(stopping.heard)
+
+    def _hear(self, event: Event) -> None:
+        if event.kind == Kind.CHANGED and not self.replaying:
+            say(str(event.reply))
 
     def _curves(self) -> dict[str, float]:
         """Numbers of the listeners for the board since the last call, by tag."""

@@ -21,6 +21,7 @@ ROWS = [  # a room imports only from rows above its own
     {"inverses", "searches", "board"},
     {"strategies"},
     {"learner"},
+    {"changes"},
     {"algorithms", "record"},
     {"session", "asking", "rivals"},
     {"runs"},
@@ -65,7 +66,7 @@ WORLDS = {"environments"}
 PROTOCOL = "environments.protocol"  # the part of ``environments`` that other rooms may import
 LEARNING = {
     *{"parts", "memory", "competence", "goals", "explore", "inverses", "searches", "strategies", "learner", "teachers"},
-    *{"asking", "rivals", "forward_model"},
+    *{"asking", "changes", "rivals", "forward_model"},
 }
 FREE = {"runs", "views", "teach", "__init__"}  # rooms that combine learning and environments
 

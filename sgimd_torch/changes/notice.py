@@ -1,0 +1,221 @@
+"""Notices that a robot has changed, and finds out what of its earlier regimes still helps.
+
+Each movement is predicted before its outcome is remembered. A CUSUM on surprises beyond the usual ones (Page 1954) says
+since when predictions fail. Then it is tested whether the movements since then predict each other better, or whether a
+calibration of what was known predicts them better: noise alone does neither. Everything follows from the exemplars and
+their order, so a replay notices the same.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from sgimd_torch.changes.calibration import Calibration, by_halves
+from sgimd_torch.changes.regimes import Exemplars, Regime, among_themselves, left_out, predicted, squared
+from sgimd_torch.inverses.gaussian_process import one_thread
+from sgimd_torch.inverses.local_process import Learnt, LocalProcess
+from sgimd_torch.memory import Memory, Rows
+from sgimd_torch.parts import Problem
+from sgimd_torch.spaces import Array
+
+_PREDICTED_FROM: Final = 60  # exemplars from which each new movement is predicted
+_RECENT, _OVER, _DRIFT, _SUSPICIOUS = 200, 4.0, 0.12, 3.0  # surprises, times their upper fifth; of the CUSUM
+_UPPER: Final = 0.8
+_FIRST, _CALM = 50, 30  # exemplars, and predictions in this regime, before anything is suspected
+_LOOKS: Final = (16, 24, 36, 54, 81, 122, 182, 273)  # movements since the suspicion at which it is tested
+_EVERY, _SLOW = 32, (64, 128)  # without a suspicion: how often, and on how many of the last movements
+_BAD: Final = 6.0  # times the variance expected: a prediction that failed
+_SURE: Final = 3.5  # T of the test
+_MOST: Final = 1.5  # largest log ratio of two errors
+_TESTED: Final = 128  # newest movements that are tested
+_REGIMES: Final = 3  # earlier regimes that are kept
+_AGREE, _VOTES = np.log(1.1), 5  # by how much an earlier exemplar has to predict the new ones nearest to it better
+_HELPS: Final = np.log(1.2)  # by how much earlier exemplars have to predict better than the new ones alone
+_FEWEST: Final = 0.1  # of the earlier exemplars
+_FIRST_LOOK: Final = 8  # movements, with a prior
+_ALONE, _CALIBRATED = 24, 12  # least movements that predict each other by their own process, that calibrate
+
+
+class Again(NamedTuple):
+    """What to begin again with: ``kept`` exemplars of the ``before`` exemplars of an earlier regime, then those of the
+    present one; whether the present regime is ``new``."""
+
+    exemplars: Exemplars
+    kept: int
+    before: int
+    new: bool
+
+
+class Notice:
+    """Watches the exemplars of a learner.
+
+    Args:
+        problem: problem to learn, with its spaces and noise.
+        life: all exemplars of the learner.
+        prior: exemplars of another robot, such as a simulator: an earlier regime from the start. None: there is none.
+
+    Attributes:
+        since: row of ``life`` in which the present regime began.
+    """
+
+    def __init__(self, problem: Problem, life: Memory, prior: Memory | None) -> None:
+        self.problem, self.life = problem, life
+        self.box, self.noise = problem.policies, problem.outcome_noise
+        self.regimes: list[Regime] = []  # earlier ones, the one that was used last comes last
+        self.since, self._review = 0, 0  # _review: length of the regime at which to look back again, 0: never
+        self._calm()
+        if prior is not None and (learnt := LocalProcess(problem.over(prior)).learnt()) is not None:
+            self.regimes, self._review = [Regime(learnt, Exemplars.of(prior))], _FIRST_LOOK
+
+    def _calm(self) -> None:
+        self._surprises: list[float] = []
+        self._errors: list[float] = []
+        self._cusum, self._start, self._quiet, self._looks = 0.0, -1, 0, 0
+
+    @one_thread
+    def expect(self, process: LocalProcess, context: Array, theta: Array, outcome: Array) -> None:
+        """Predict a movement that is not in memory yet, and compare."""
+        learnt = process.learnt()
+        if learnt is None:
+            return
+        here = ((np.concatenate((theta, context)) - learnt.units[0]) / learnt.units[1])[None]
+        near = learnt.inputs.nearest(here, _PREDICTED_FROM)
+        outcomes = process.memory.outcomes
+        (expected,), (variance,), _ = predicted(learnt.inputs, outcomes, near, here, learnt.kernel)
+        error = float(squared(expected - outcome))
+        self._errors.append(error)
+        self._surprises = [*self._surprises[-_RECENT:], error / (len(outcome) * float(variance) + 1e-300)]
+
+    def look(self, process: LocalProcess) -> Again | None:
+        """What to begin again with; None to go on."""
+        n, present = len(self.life), len(process.memory)
+        if self._review and n - self.since >= self._review:
+            return self._look_back(new=False)
+        if present < _FIRST or len(self._surprises) < _CALM:
+            return None
+        start = self._suspected(process, n)
+        learnt = process.learnt() if start >= 0 else None
+        if learnt is None or not self._has_changed(process.memory, learnt, n - start):
+            return None
+        before = Regime(learnt, Exemplars.of(process.memory, slice(present - (n - start))))
+        self.regimes, self.since = [*self.regimes, before][-_REGIMES:], start
+        return self._look_back(new=True)
+
+    def _suspected(self, process: LocalProcess, n: int) -> int:
+        """Row from which to test now; -1: none."""
+        if self._start < 0:
+            self._usual = _upper(self._surprises[:-1])
+        self._cusum = max(0.0, self._cusum + (self._surprises[-1] > _OVER * self._usual) - _DRIFT)
+        if self._start < 0:
+            if self._cusum == 0:
+                self._quiet = n
+            if self._cusum >= _SUSPICIOUS:
+                self._start, self._looks = self._quiet, 0
+                self._usual = _upper(self._surprises[: self._quiet - n] or self._surprises)
+        if self._start >= 0:
+            m = n - self._start
+            due = sum(m >= look for look in _LOOKS)
+            if due > self._looks:
+                self._looks = due
+                return self._start
+            if self._cusum == 0 or m > _LOOKS[-1]:
+                self._calm()
+        elif (n - self.since) % _EVERY == 0:  # slow changes: do the last ones predict each other better?
+            return self._slow(process, n)
+        return -1
+
+    def _slow(self, process: LocalProcess, n: int) -> int:
+        learnt, present = process.learnt(), len(process.memory)
+        for m in _SLOW:
+            if learnt is not None and len(self._errors) >= m and present >= 4 * m:
+                last, kernel = learnt.inputs.keys.rows[-m:], learnt.kernel
+                others = among_themselves(last, process.memory.outcomes[-m:], kernel)
+                if self._better(np.array(self._errors[-m:]), others) >= _SURE:
+                    return n - m
+        return -1
+
+    @one_thread
+    def _has_changed(self, memory: Memory, learnt: Learnt, m: int) -> bool:
+        """Whether the last ``m`` movements are of another regime."""
+        n = len(memory)
+        if n - m < _CALM:
+            return False
+        rows = np.arange(max(n - m, n - _TESTED), n)
+        told, before = Exemplars.of(memory, rows), Regime(learnt, Exemplars.of(memory, slice(n - m)))
+        expected, variances, _ = before.predict(told.contexts, told.thetas)
+        as_it_was = squared(expected - told.outcomes)
+        failed = as_it_was > _BAD * variances * expected.shape[1]
+        # If nothing had changed, both would predict; the first errs more where noise has grown.
+        nulls = left_out(learnt.inputs, memory.outcomes, rows, learnt.kernel), as_it_was
+        inputs = before.in_lengths(told.contexts, told.thetas)
+        others = among_themselves(inputs, told.outcomes, learnt.kernel), by_halves(before, self.box, told)
+        return any(
+            all(self._better(null[which], other[which]) >= _SURE for null in nulls)
+            for other in others
+            for which in (slice(None), failed)  # a local change is seen in those that failed
+        )
+
+    def _gains(self, errors: Array, others: Array) -> Array:
+        """By how much others predict better: log ratios of errors; noise is not to be had."""
+        floor = self.noise**2 + 1e-300
+        return np.clip(0.5 * np.log((errors + floor) / (others + floor)), -_MOST, _MOST)
+
+    def _better(self, errors: Array, others: Array) -> float:
+        """T, self-normalised: how sure it is that others predict better."""
+        gains = self._gains(errors, others)
+        return float(gains.sum() / np.sqrt(squared(gains) + 1e-300))
+
+    @one_thread
+    def _look_back(self, *, new: bool) -> Again:
+        """Exemplars of earlier regimes that help to predict this one, then all of this one."""
+        now = Exemplars.of(self.life, slice(self.since, None))
+        n = len(now.thetas)
+        test = np.arange(max(0, n - _TESTED), n)
+        told = now.of_rows(test)
+        alone = self._left_out(now, test) if n >= _ALONE else None
+        best, usual, kept, before = -np.inf, 0.0, now.of_rows(slice(0)), 0
+        for regime in self.regimes:
+            mine = alone
+            if mine is None:
+                mine = among_themselves(regime.in_lengths(told.contexts, told.thetas), told.outcomes, regime.kernel)
+            errors = [squared(regime.predict(told.contexts, told.thetas)[0] - told.outcomes)]
+            errors += [by_halves(regime, self.box, told)] if n >= _CALIBRATED else []
+            for change, each in enumerate(errors):
+                gains = self._gains(mine, each)
+                if gains.mean() > best:
+                    best, usual = float(gains.mean()), float(np.median(each))
+                    chosen, calibrated, by_row = regime, bool(change), gains
+        if self.regimes:
+            self.regimes = [*(each for each in self.regimes if each is not chosen), chosen]
+            kept, before = self._helpful(chosen, calibrated, by_row, usual, told), len(chosen.exemplars.thetas)
+            if len(kept.thetas) and alone is not None:
+                together = self._left_out(kept.and_then(now), len(kept.thetas) + test)
+                if self._gains(alone, together).mean() < _HELPS:
+                    kept = now.of_rows(slice(0))
+        self._review = 2 * n if len(kept.thetas) else 0
+        self._calm()
+        return Again(kept.and_then(now), len(kept.thetas), before, new)
+
+    def _left_out(self, exemplars: Exemplars, rows: Rows) -> Array | None:
+        """Squared errors of predicting these rows from all others, by a process of their own."""
+        learnt = LocalProcess(self.problem.over(exemplars.memory)).learnt()
+        return None if learnt is None else left_out(learnt.inputs, exemplars.outcomes, rows, learnt.kernel)
+
+    def _helpful(self, regime: Regime, calibrated: bool, gains: Array, usual: float, told: Exemplars) -> Exemplars:
+        """Exemplars of an earlier regime, as they would come out now, where they predict better than those of now."""
+        before, ok = regime.exemplars, np.ones(len(regime.exemplars.thetas), dtype=bool)
+        if calibrated:
+            before, ok = Calibration(regime, self.box).fit(told).translated(max(usual, self.noise**2))
+        voters = regime.in_lengths(told.contexts, told.thetas)
+        old = regime.in_lengths(before.contexts, before.thetas)
+        apart = squared(old)[:, None] + squared(voters) - 2 * old @ voters.T
+        votes = min(_VOTES, len(voters))
+        ok &= gains[np.argpartition(apart, votes - 1, axis=1)[:, :votes]].mean(axis=1) > _AGREE
+        return before.of_rows(ok if ok.mean() >= _FEWEST else slice(0))
+
+
+def _upper(values: list[float]) -> float:
+    """The value below which four fifths of the values lie."""
+    return sorted(values)[int(_UPPER * len(values))]
