@@ -2,7 +2,7 @@
 
 Our addition. When a change is noticed, the learner begins again: it is built anew by the function that has built it.
 The memory of its problem then holds all movements since the change, and those of before that help to predict them, as
-they are or calibrated. The paper's learner focuses again on regions where it gets worse (section 3.2.1), but remembers all.
+they are or calibrated. The paper asks that a learner focus again where it gets worse (section 3.2.1).
     return watched(begin, seed, memory, prior)    # at the end of an algorithm
 """
 
@@ -58,12 +58,12 @@ class Watcher:
         self._notice: Notice | None = None
         if prior is not None:
             learner.memory, learner.begun = Memory(*learner.problem.dims), 0
-        self._numbers = [0] * learner.begun  # numbers of the movements of all exemplars
+        self._numbers = [0] * learner.begun  # of each exemplar the number of its movement, or of the last one before it
 
     def expect(self, context: Array, theta: Array, outcome: Array) -> None:
         """Compare an outcome, which is not in memory yet, with what is expected."""
         learner, process = self._learner, _process_of(self._learner)
-        self._numbers.append(learner.movements)
+        self._numbers.append(max(0, learner.movements - 1))
         if process is None or (self._prior is None and len(process.memory) < _FIRST):
             return
         if self._notice is None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sgimd_torch.changes.calibration import Calibration, by_halves
 from sgimd_torch.changes.regimes import Exemplars, Regime, among_themselves, left_out, predicted, squared
@@ -31,9 +32,8 @@ _SURE: Final = 3.5  # T of the test
 _MOST: Final = 1.5  # largest log ratio of two errors
 _TESTED: Final = 128  # newest movements that are tested
 _REGIMES: Final = 3  # earlier regimes that are kept
-_AGREE, _VOTES = np.log(1.1), 5  # by how much an earlier exemplar has to predict the new ones nearest to it better
-_HELPS: Final = np.log(1.2)  # by how much earlier exemplars have to predict better than the new ones alone
-_FEWEST: Final = 0.1  # of the earlier exemplars
+_SURER: Final = 0.5  # largest variance of the outcome of an earlier exemplar now, relative to its variance without it
+_GROWS: Final = 2  # factor of the movements of a regime from one look back to the next
 _FIRST_LOOK: Final = 8  # movements, with a prior
 _ALONE, _CALIBRATED = 24, 12  # least movements that predict each other by their own process, that calibrate
 
@@ -97,10 +97,11 @@ class Notice:
             return None
         start = self._suspected(process, n)
         learnt = process.learnt() if start >= 0 else None
-        if learnt is None or not self._has_changed(process.memory, learnt, n - start):
+        m = 0 if learnt is None else self._changed(process.memory, learnt, n - start)
+        if learnt is None or not m:
             return None
-        before = Regime(learnt, Exemplars.of(process.memory, slice(present - (n - start))))
-        self.regimes, self.since = [*self.regimes, before][-_REGIMES:], start
+        before = Regime(learnt, Exemplars.of(process.memory, slice(present - m)))
+        self.regimes, self.since = [*self.regimes, before][-_REGIMES:], n - m
         return self._look_back(new=True)
 
     def _suspected(self, process: LocalProcess, n: int) -> int:
@@ -137,25 +138,27 @@ class Notice:
         return -1
 
     @one_thread
-    def _has_changed(self, memory: Memory, learnt: Learnt, m: int) -> bool:
-        """Whether the last ``m`` movements are of another regime."""
+    def _changed(self, memory: Memory, learnt: Learnt, m: int) -> int:
+        """How many of the last ``m`` movements are of another regime, 0 for none."""
         n = len(memory)
         if n - m < _CALM:
-            return False
+            return 0
         rows = np.arange(max(n - m, n - _TESTED), n)
         told, before = Exemplars.of(memory, rows), Regime(learnt, Exemplars.of(memory, slice(n - m)))
         expected, variances, _ = before.predict(told.contexts, told.thetas)
         as_it_was = squared(expected - told.outcomes)
         failed = as_it_was > _BAD * variances * expected.shape[1]
         # If nothing had changed, both would predict; the first errs more where noise has grown.
-        nulls = left_out(learnt.inputs, memory.outcomes, rows, learnt.kernel), as_it_was
+        nulls = left_out(learnt.inputs, memory.outcomes, rows, learnt.kernel)[0], as_it_was
         inputs = before.in_lengths(told.contexts, told.thetas)
         others = among_themselves(inputs, told.outcomes, learnt.kernel), by_halves(before, self.box, told)
-        return any(
-            all(self._better(null[which], other[which]) >= _SURE for null in nulls)
-            for other in others
-            for which in (slice(None), failed)  # a local change is seen in those that failed
-        )
+        for other in others:
+            for which in (slice(None), failed):  # a local change is seen in those that failed
+                if all(self._better(null[which], other[which]) >= _SURE for null in nulls):
+                    # The suspicion may have begun too early: the first movements then fit the old regime better.
+                    last = 1 + int(self._gains(as_it_was, other)[::-1].cumsum().argmax())
+                    return m if last == len(rows) else last
+        return 0
 
     def _gains(self, errors: Array, others: Array) -> Array:
         """By how much others predict better: log ratios of errors; noise is not to be had."""
@@ -171,49 +174,51 @@ class Notice:
     def _look_back(self, *, new: bool) -> Again:
         """Exemplars of earlier regimes that help to predict this one, then all of this one."""
         now = Exemplars.of(self.life, slice(self.since, None))
-        n = len(now.thetas)
+        n, nothing = len(now.thetas), now.of_rows(slice(0))
         test = np.arange(max(0, n - _TESTED), n)
         told = now.of_rows(test)
-        alone = self._left_out(now, test) if n >= _ALONE else None
-        best, usual, kept, before = -np.inf, 0.0, now.of_rows(slice(0)), 0
+        best, kept, before = -np.inf, nothing, 0
         for regime in self.regimes:
-            mine = alone
-            if mine is None:
-                mine = among_themselves(regime.in_lengths(told.contexts, told.thetas), told.outcomes, regime.kernel)
+            mine, _ = self._process(now, regime).left_out(test)
             errors = [squared(regime.predict(told.contexts, told.thetas)[0] - told.outcomes)]
             errors += [by_halves(regime, self.box, told)] if n >= _CALIBRATED else []
             for change, each in enumerate(errors):
-                gains = self._gains(mine, each)
-                if gains.mean() > best:
-                    best, usual = float(gains.mean()), float(np.median(each))
-                    chosen, calibrated, by_row = regime, bool(change), gains
+                gain = float(self._gains(mine, each).mean())
+                if gain > best:
+                    best, chosen, calibrated, alone = gain, regime, bool(change), mine
         if self.regimes:
             self.regimes = [*(each for each in self.regimes if each is not chosen), chosen]
-            kept, before = self._helpful(chosen, calibrated, by_row, usual, told), len(chosen.exemplars.thetas)
-            if len(kept.thetas) and alone is not None:
-                together = self._left_out(kept.and_then(now), len(kept.thetas) + test)
-                if self._gains(alone, together).mean() < _HELPS:
-                    kept = now.of_rows(slice(0))
-        self._review = 2 * n if len(kept.thetas) else 0
+            kept, before = self._helpful(chosen, calibrated, now, test), len(chosen.exemplars.thetas)
+            if len(kept.thetas):
+                together, _ = self._process(kept.and_then(now), chosen).left_out(len(kept.thetas) + test)
+                if self._gains(alone, together).mean() < 0:
+                    kept = nothing
+        self._review = _GROWS * n if len(kept.thetas) else 0
         self._calm()
         return Again(kept.and_then(now), len(kept.thetas), before, new)
 
-    def _left_out(self, exemplars: Exemplars, rows: Rows) -> Array | None:
-        """Squared errors of predicting these rows from all others, by a process of their own."""
-        learnt = LocalProcess(self.problem.over(exemplars.memory)).learnt()
-        return None if learnt is None else left_out(learnt.inputs, exemplars.outcomes, rows, learnt.kernel)
+    def _process(self, exemplars: Exemplars, regime: Regime) -> Regime:
+        """A process of these exemplars; if they are few, with lengths and kernel of an earlier regime."""
+        few = len(exemplars.thetas) < _ALONE
+        learnt = None if few else LocalProcess(self.problem.over(exemplars.memory)).learnt()
+        return Regime(learnt or regime.learnt, exemplars)
 
-    def _helpful(self, regime: Regime, calibrated: bool, gains: Array, usual: float, told: Exemplars) -> Exemplars:
-        """Exemplars of an earlier regime, as they would come out now, where they predict better than those of now."""
-        before, ok = regime.exemplars, np.ones(len(regime.exemplars.thetas), dtype=bool)
+    def _helpful(self, regime: Regime, calibrated: bool, now: Exemplars, test: Rows) -> Exemplars:
+        """Exemplars of an earlier regime, as they would come out now, where they are surer than those of now.
+
+        What a calibration leaves unexplained is a process, too.
+        """
+        calibration = Calibration(regime, self.box)
         if calibrated:
-            before, ok = Calibration(regime, self.box).fit(told).translated(max(usual, self.noise**2))
-        voters = regime.in_lengths(told.contexts, told.thetas)
-        old = regime.in_lengths(before.contexts, before.thetas)
-        apart = squared(old)[:, None] + squared(voters) - 2 * old @ voters.T
-        votes = min(_VOTES, len(voters))
-        ok &= gains[np.argpartition(apart, votes - 1, axis=1)[:, :votes]].mean(axis=1) > _AGREE
-        return before.of_rows(ok if ok.mean() >= _FEWEST else slice(0))
+            calibration.fit(now.of_rows(test))
+        left = now._replace(outcomes=now.outcomes - calibration.predict(now.contexts, now.thetas))
+        before, certain = calibration.translated(max(float(np.median(squared(left.outcomes[test]))), self.noise**2))
+        of_left, alone = self._process(left, regime), self._process(now, regime)
+        wrong, variances, _ = of_left.predict(before.contexts, before.thetas)
+        _, without, _ = alone.predict(before.contexts, before.thetas)
+        ok: NDArray[np.bool_] = variances * of_left.doubt(test) < _SURER * without * alone.doubt(test)
+        before = before._replace(outcomes=before.outcomes + wrong)
+        return before.of_rows(np.logical_and(ok, certain))
 
 
 def _upper(values: list[float]) -> float:

@@ -56,7 +56,7 @@ class Regime:
     """
 
     def __init__(self, learnt: Learnt, exemplars: Exemplars) -> None:
-        self.exemplars, self.kernel, self.units = exemplars, learnt.kernel, learnt.units
+        self.learnt, self.exemplars, self.kernel, self.units = learnt, exemplars, learnt.kernel, learnt.units
         self._neighbours = neighbours_of(self.in_lengths(exemplars.contexts, exemplars.thetas))
 
     def in_lengths(self, contexts: Array, thetas: Array) -> Array:
@@ -72,20 +72,29 @@ class Regime:
         dim = thetas.shape[1]
         return found, variances, slopes[:, :, :dim] / self.units[1, :dim]
 
+    def left_out(self, rows: Rows) -> tuple[Array, Array]:
+        """See the function `left_out`."""
+        return left_out(self._neighbours, self.exemplars.outcomes, rows, self.kernel)
 
-def left_out(inputs: PolicyNeighbours, outcomes: Array, rows: Rows, kernel: Array) -> Array:
-    """Squared errors ``(len(rows),)`` of predicting each of these rows from all other rows."""
+    def doubt(self, rows: Rows) -> float:
+        """Mean squared error of predicting each of these rows from all others, divided by the expected one."""
+        errors, variances = self.left_out(rows)
+        return float(errors.sum() / (variances.sum() * self.exemplars.outcomes.shape[1] + 1e-300))
+
+
+def left_out(inputs: PolicyNeighbours, outcomes: Array, rows: Rows, kernel: Array) -> tuple[Array, Array]:
+    """Squared errors ``(len(rows),)`` of predicting each of these rows from all other rows, and their variances."""
     here = inputs.keys.rows[rows]
     near = inputs.nearest(here, NEAR + 1)
     itself_last = np.argsort(near == rows[:, None], axis=1, kind="stable")
     near = np.take_along_axis(near, itself_last[:, :-1], axis=1)
-    found, _, _ = predicted(inputs, outcomes, near, here, kernel)
-    return squared(found - outcomes[rows])
+    found, variances, _ = predicted(inputs, outcomes, near, here, kernel)
+    return squared(found - outcomes[rows]), variances
 
 
 def among_themselves(inputs: Array, outcomes: Array, kernel: Array) -> Array:
     """Squared errors ``(n,)`` of predicting each movement from all others of them."""
-    return left_out(neighbours_of(inputs), outcomes, np.arange(len(inputs)), kernel)
+    return left_out(neighbours_of(inputs), outcomes, np.arange(len(inputs)), kernel)[0]
 
 
 def predicted(

@@ -170,7 +170,7 @@ def test_a_circle_is_found():
 def test_there_are_few_rooms_and_no_folder_is_crowded():
     package = Path(sgimd_torch.__path__[0])
     rooms = {path for path in package.iterdir() if path.is_dir() and list(path.glob("*.py"))} | {*package.glob("*.py")}
-    assert len(rooms - {package / "__init__.py", package / "__main__.py"}) <= 27
+    assert len(rooms - {package / "__init__.py", package / "__main__.py"}) <= 28
     for folder in [path for path in package.rglob("*") if path.is_dir()] + [package]:
         assert len(list(folder.glob("*.py"))) <= 16, folder
 
