@@ -48,8 +48,7 @@ class Competence(Judge):
 
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)
-        self._asked: tuple[bytes, bytes] | None = None
-        self._row: int | None = None
+        self._asked: tuple[bytes, bytes, int] | None = None
 
     def __call__(self, context: Array, goal: Array, outcomes: Array | None = None) -> float:
         """Competence in [-1, 0], -1 for an empty memory; ``outcomes`` is not used, as they are in memory already.
@@ -59,14 +58,12 @@ class Competence(Judge):
         memory = self.problem.memory
         if not len(memory):
             return -1.0
-        asked = context.tobytes(), goal.tobytes()
+        asked = context.tobytes(), goal.tobytes(), len(memory)
         if asked != self._asked:
-            self._asked, self._row = asked, None
-            self._far = max(float(_distance(goal, self.problem.rest)), self.problem.tolerance)
-        if (row := int(memory.near_outcomes(context, goal, 1)[0])) != self._row:
             # `performance` without its general shapes, as each movement asks for it
-            missed = float(_distance(goal, memory.outcomes[row]))
-            self._row, self._best = row, -min(1.0, missed / self._far)
+            missed = float(_distance(goal, memory.outcomes[memory.near_outcomes(context, goal, 1)[0]]))
+            far = max(float(_distance(goal, self.problem.rest)), self.problem.tolerance)
+            self._asked, self._best = asked, -min(1.0, missed / far)
         return self._best
 
 

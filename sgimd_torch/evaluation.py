@@ -8,9 +8,9 @@ its movements, and it has random streams of its own.
 from __future__ import annotations
 
 import os
+from bisect import bisect_left
 from collections.abc import Callable
-from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
@@ -24,6 +24,8 @@ from sgimd_torch.spaces import Array, Box, check_count, check_vector, first_entr
 
 SHIPPED = Path(__file__).with_name("data") / "benchmark.npz"
 TILES: Final = 358  # number of goals in the paper's benchmark
+TOGETHER: Final = 128  # number of movements that an evaluation executes at once; Ctrl-C works between them
+RECENT: Final = 50  # number of latest goals, or movements, over which the results at the learner's own goals are taken
 SIDES: Final = np.linspace(0.025, 0.1, 301)  # sides of a tile to try, relative to T's: 1600 to 100 tiles in the plane
 
 
@@ -104,6 +106,44 @@ class Evaluation:
         return int((self.errors <= near).sum())
 
 
+@dataclass
+class OwnGoals:
+    """How nearly a learner met the goals that it chose. A run without evaluations has no other measure of learning.
+
+    A goal counts once, by the nearest outcome of its movements: of those that follow each other, or that only movements
+    of other robots separate.
+
+    Args:
+        at_once: number of robots that move at once.
+
+    Attributes:
+        begun: number of the first movement at each goal, in order.
+        missed: distance from each goal to its nearest outcome, in the unit of T.
+    """
+
+    at_once: int = 1
+    begun: list[int] = field(default_factory=list)
+    missed: list[float] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._seen: dict[bytes, tuple[int, int]] = {}  # for each goal its place, and the number of its last movement
+
+    def add(self, index: int, goal: Array, outcome: Array) -> None:
+        """Count the movement with the number ``index``, which had an outcome."""
+        place, last = self._seen.get(goal.tobytes(), (0, -self.at_once - 1))
+        if index - last > self.at_once:
+            place = len(self.begun)
+            self.begun.append(index)
+            self.missed.append(np.inf)
+        self._seen[goal.tobytes()] = place, index
+        self.missed[place] = min(self.missed[place], float(np.linalg.norm(outcome - goal)))
+
+    def recent(self, movements: int) -> Array:
+        """``(n,)``, distances missed at the last 50 goals begun in this number of ``movements``, or fewer."""
+        until = bisect_left(self.begun, movements)
+        return np.array(self.missed[max(0, until - RECENT) : until])
+
+
 def contexts_of_goals(environment: Environment, n: int) -> Array:
     """``(n, context_dim)``, an observed context for each goal, equal in all evaluations, so comparisons are paired."""
     if environment.contexts.dim == 0:
@@ -136,8 +176,8 @@ def evaluate(
         repeats: number k of repetitions of each movement, 2 or more; 0 to leave the noise unmeasured. The measured
             scatter is multiplied by sqrt(k / (k - 1)), because outcomes lie nearer to their own mean than to the true
             mean; for Gaussian noise the result does not depend on k.
-        between: function to call before each movement, or once if all are executed together; its `KeyboardInterrupt`
-            ends the evaluation.
+        between: function to call before each movement, or before each 128 if the environment executes them together;
+            its `KeyboardInterrupt` ends the evaluation.
 
     Raises:
         ValueError: there are no goals, goals have another dimension or are not finite, or a number is out of its range.
@@ -172,16 +212,17 @@ def _landed(
     environment: Environment, contexts: Array, thetas: Array, seed: int, name: str, between: Callable[[], object]
 ) -> Array:
     """Outcomes ``(n, outcome_dim)``, NaN for a failed movement; movement i has stream i of this ``name``."""
-    rows = range(len(thetas))
-    if isinstance(environment, BatchEnvironment):
+    landed, n = np.full((len(thetas), environment.outcomes.dim), np.nan), len(thetas)
+    together = TOGETHER if isinstance(environment, BatchEnvironment) else 1
+    waiting = [list(range(start, min(start + together, n))) for start in range(0, n, together)][::-1]
+    while waiting:
         between()
-        with suppress(Exception, SystemExit):  # a movement failed; the loop below finds it
-            return execute_many(environment, contexts, thetas, [stream(seed, name, row) for row in rows])
-    landed = np.full((len(thetas), environment.outcomes.dim), np.nan)
-    for row in rows:
-        between()
-        with suppress(Exception, SystemExit):  # no failure of a robot may end an evaluation
-            landed[row] = execute_many(environment, contexts[[row]], thetas[[row]], [stream(seed, name, row)])[0]
+        rows = waiting.pop()
+        try:
+            rngs = [stream(seed, name, row) for row in rows]
+            landed[rows] = execute_many(environment, contexts[rows], thetas[rows], rngs)
+        except (Exception, SystemExit):  # no failure of a robot may end an evaluation
+            waiting += [[row] for row in rows if len(rows) > 1]  # one of them failed: they move again, one by one
     return landed
 
 
@@ -201,17 +242,22 @@ def tile_goals(outcomes: Array, box: Box, side: float, rng: np.random.Generator)
     return box.clip(box.low + (tiles + rng.random(tiles.shape)) * side)
 
 
-def tile_side(outcomes: Array, box: Box, tiles: int = TILES) -> float:
-    """The side of a tile with which about ``tiles`` tiles have two outcomes or more; see `tile_goals`.
+def tile_sides(outcomes: Array, box: Box) -> Array:
+    """``(n,)``, sides of tiles to choose from, increasing.
 
-    In the plane the side is a fortieth to a tenth of T's side. In other dimensions it is chosen so that T has as many
+    In the plane they are a fortieth to a tenth of T's side. In other dimensions they are chosen so that T has as many
     tiles as in the plane. If outcomes span less than a tenth of a side of T, their span replaces that side.
     """
     inside = outcomes[box.contains(outcomes)]
     reached = np.ptp(inside, axis=0) if len(inside) else box.sides
     lengths = np.where((reached > 0) & (reached < box.sides / 10), reached, box.sides)
-    sides = np.prod(lengths) ** (1 / box.dim) * SIDES ** (2 / box.dim)
-    return float(min(sides, key=lambda side: abs(len(_reached(inside, box, side)) - tiles)))
+    return np.asarray(np.prod(lengths) ** (1 / box.dim) * SIDES ** (2 / box.dim))
+
+
+def tile_side(outcomes: Array, box: Box, tiles: int = TILES) -> float:
+    """The one of `tile_sides` with which about ``tiles`` tiles have two outcomes or more; see `tile_goals`."""
+    inside = outcomes[box.contains(outcomes)]
+    return float(min(tile_sides(outcomes, box), key=lambda side: abs(len(_reached(inside, box, side)) - tiles)))
 
 
 def _reached(outcomes: Array, box: Box, side: float) -> Array:

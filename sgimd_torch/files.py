@@ -11,6 +11,7 @@ import io
 import lzma
 import math
 import os
+import stat
 import tokenize
 import zipfile
 import zlib
@@ -36,9 +37,10 @@ def check_regular(path: str | os.PathLike[str]) -> None:
     """Refuse a named pipe or a device, which might keep its reader waiting for ever.
 
     Raises:
-        OSError: ``path`` is neither a file nor a folder, though something is there.
+        OSError: ``path`` is neither a file nor a folder.
     """
-    if os.path.exists(path) and not os.path.isfile(path) and not os.path.isdir(path):
+    mode = os.stat(path).st_mode
+    if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
         raise OSError(f"{path} is a pipe or a device, not a file")
 
 
@@ -142,6 +144,7 @@ def _array(stored: zipfile.ZipFile, name: str) -> Stored:
 
 def checksum(path: Path) -> str:
     """CRC-32 of the content of a file, in hexadecimal."""
+    check_regular(path)
     return f"{zlib.crc32(path.read_bytes()):08x}"
 
 

@@ -168,9 +168,10 @@ class Box:
             raise ValueError(f"Box needs corners with low < high, got {low} and {high}; were they swapped?")
         given: Any = self.names
         names = tuple(given)
-        texts = all(isinstance(each, str) for each in (*names, self.unit))
+        texts = all(isinstance(each, str) and each.isprintable() for each in (*names, self.unit))
         if isinstance(given, str) or len(names) not in (0, len(low)) or not texts:
-            raise ValueError(f"Box needs {len(low)} names and a unit, all texts, got {given} and {self.unit!r}")
+            wanted = "all texts without control characters"
+            raise ValueError(f"Box needs {len(low)} names and a unit, {wanted}, got {given!r} and {self.unit!r}")
         object.__setattr__(self, "names", names)
         for name, corner in (("low", low), ("high", high)):
             corner.flags.writeable = False
@@ -263,12 +264,18 @@ class Failure(NamedTuple):
 
 class Estimate(NamedTuple):
     """The answer of an inverse model to a goal in a ``context`` ``(context_dim,)``: ``theta`` ``(theta_dim,)``, and
-    exemplars at which a search may begin, ``thetas`` ``(k, theta_dim)`` with ``outcomes`` ``(k, outcome_dim)``."""
+    exemplars at which a search may begin, ``thetas`` ``(k, theta_dim)`` with ``outcomes`` ``(k, outcome_dim)``.
+
+    ``expected`` ``(outcome_dim,)`` is the outcome that the inverse model expects of theta, and ``sd`` the standard
+    deviation from it in each dimension, noise included, in the unit of T; None: the inverse model does not know.
+    """
 
     theta: Array
     thetas: Array
     outcomes: Array
     context: Array = np.zeros(0)
+    expected: Array | None = None
+    sd: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,5 +1,6 @@
 """Eq. (10): errors worked out on an arm, a noise floor that is known analytically, and a benchmark that fits or not."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -71,6 +72,24 @@ def test_a_perfect_inverse_makes_no_error_in_any_context_given_for_all_goals_or_
         found = evaluate(Perfect(arm), arm, goals, 0, 0, context=context, repeats=0)
         assert found.errors == pytest.approx(np.zeros(4), abs=1e-9)
         assert context is None or np.array_equal(found.contexts, np.broadcast_to(context, (4, 1)))
+
+
+def test_ctrl_c_is_heard_between_blocks_of_movements_also_if_the_robot_executes_many_together() -> None:
+    class Counted(PlanarArm):
+        sizes: list[int] = []  # noqa: RUF012
+
+        def execute_many(self, contexts: Array, thetas: Array, rngs: Sequence[np.random.Generator]) -> Array:
+            self.sizes.append(len(thetas))
+            return super().execute_many(contexts, thetas, rngs)
+
+    def between() -> None:
+        if len(arm.sizes) == 2:
+            raise KeyboardInterrupt
+
+    arm, goals = Counted(5), stream(0, "goals").uniform(-0.6, 0.6, (300, 2))
+    with pytest.raises(KeyboardInterrupt):
+        evaluate(Perfect(arm), arm, goals, 0, 0, repeats=2, between=between)
+    assert arm.sizes == [128, 128]
 
 
 def test_without_contexts_an_environment_is_not_asked_for_any() -> None:

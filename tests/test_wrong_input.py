@@ -50,6 +50,8 @@ COMMANDS = {
     "run --resume yes": "'yes' belongs to no option; .* --resume, --accept-loss take no value",
     "run --movements 1e3": "--movements must be a whole number, got 1e3",
     "run --movements": "--movements needs a value",
+    "run --seed 1_0": "--seed must be a whole number, got 1_0",  # int() of Python would read 10
+    "run --algorithm sagg-riac --global-range 0_1,0.9": "--global-range must be two numbers .* got 0_1,0.9",
     "run --seed -3": "seed must be at least 0, got -3",
     "run --failures 0": "failures must be at least 1, got 0",
     "run --goals grid --goals.windw 3": "--goals.windw: goals grid has no such option; did you mean goals.window",
@@ -69,7 +71,7 @@ COMMANDS = {
     "run --search nelder": r"unknown search 'nelder'; did you mean nelder-mead\? Known are nelder-mead, .*package",
     "run --environment toss:Toss --algorithm sgim-d": "Toss has no demonstrations, .* --algorithm practice",
     "run --algorithm random --environment toss:Toss --environment.noise 1": "environment toss:Toss has no such option",
-    "run --algorithm sgim-d --demonstrations nothing.npz": "nothing.npz cannot be read or written: No such file",
+    "run --algorithm sgim-d --demonstrations nothing.npz": "nothing.npz cannot be read or written",
     "run --algorithm sgim-d --demonstrations shown.csv": "shown.csv is no demonstration file: .* demonstrations import",
     "run --benchmark shown.csv": "shown.csv is no benchmark: it is not an npz file",
     "run --out shown.csv --environment planar-arm-7": "shown.csv.* cannot be made: .* a file in its place",
@@ -136,7 +138,7 @@ COMMANDS = {
     "demo --seed -1": "seed must be",
     "demo --movements 0": "movements must be",
     "demo --evaluate_at []": "--evaluate-at",
-    "demonstrations check nothing.npz --environment planar-arm-7": "there is no nothing.npz",
+    "demonstrations check nothing.npz --environment planar-arm-7": "nothing.npz cannot be read or written",
     "demo --algorithm random": "--algorithm cannot be given here",
 }
 MANY_RUNS = {  # what these say is longer: their usage, or the list of runs, comes first
@@ -148,6 +150,10 @@ MANY_RUNS = {  # what these say is longer: their usage, or the list of runs, com
     "sweep --seeds=-1": "--seeds",
     "sweep --seeds 1,,2": "--seeds",
     "sweep --seeds five": "--seeds",
+    "sweep --seeds 1_0": "must be like 5, 0-19 or 0,3,7-9, got '1_0'",
+    "table runs --at 1_0": "argument --at: must be a whole number, got '1_0'",
+    "ask run --goal 0.1,1_0": "argument --goal: must be numbers with commas, got '0.1,1_0'",
+    "demonstrations import shown.csv --out a.npz --rate 5_0": "argument --rate: must be a number, got '5_0'",
     "sweep --processes 0": "--processes",
     "sweep --processes two": "--processes",
     "sweep --algorithm sgim-d --demonstrations nowhere.npz": "nowhere.npz",
@@ -221,6 +227,7 @@ CALLS = {
     "one goal": (lambda: evaluate(learner().inverse, ARM, np.zeros(2), 0, 0), "goals must have shape"),
     "corners swapped": (lambda: Box(np.ones(2), np.zeros(2)), "corners with low < high, .* were they swapped?"),
     "a text for names": (lambda: Box(np.zeros(2), np.ones(2), names="xy"), "Box needs 2 names"),
+    "an escape code in a name": (lambda: Box.cube(0, 1, 1, names=("x\x1b[31m",)), "without control characters"),
     "a seed for a teacher": (lambda: PeriodicTeacher([SHOWN], 0), "rng must be a numpy.random.Generator, got int"),
     "no return": (
         lambda: execute_many(Silent(5), np.zeros((3, 0)), np.full((3, 5), 0.5), [stream(0, "a", k) for k in range(3)]),

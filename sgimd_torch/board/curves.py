@@ -6,18 +6,17 @@ Section 3.2.1 of Nguyen & Oudeyer (2014) defines interest and competence of a re
 
 from __future__ import annotations
 
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
 
-from sgimd_torch.evaluation import Evaluation
+from sgimd_torch.evaluation import Evaluation, OwnGoals
 from sgimd_torch.goals.regions import Region
-from sgimd_torch.spaces import Array, Episode
+from sgimd_torch.spaces import Episode
 
 DEPTH: Final = 3  # levels of the tree of regions, below its root, that have curves; so at most 15 regions have them
-_RECENT: Final = 50  # number of latest goals over which the curves of goals are computed
 
 
 class Behaviour:
@@ -25,19 +24,18 @@ class Behaviour:
 
     Args:
         tolerance: distance, in the unit of T, at which a goal counts as reached.
+        at_once: number of robots that move at once.
     """
 
-    def __init__(self, tolerance: float) -> None:
-        self.tolerance = tolerance
+    def __init__(self, tolerance: float, at_once: int = 1) -> None:
+        self.tolerance, self._own, self._movements = tolerance, OwnGoals(at_once), 0
         self._since: Counter[str] = Counter()  # number of movements since the last point, by tag
         self._imitated: list[float] = []  # distances missed by imitations since the last point
-        self._goal: Array | None = None
-        self._missed_by: deque[float] = deque(maxlen=_RECENT)  # smallest distance for each goal
         self._demonstrations = self._answered = 0
 
     def episode(self, episode: Episode) -> None:
         """Count a movement."""
-        move = episode.move
+        move, self._movements = episode.move, episode.index + 1
         self._demonstrations += episode.demonstration is not None
         regime = "failed" if episode.failed else "rest" if move is None else move.origin
         self._since[f"regime/{regime}"] += 1
@@ -46,15 +44,10 @@ class Behaviour:
             self._since[f"strategy/{episode.request.strategy}"] += 1
         if move is None or move.goal is None or episode.outcome is None:
             return
-        distance = float(np.linalg.norm(episode.outcome - move.goal))
-        begins = self._goal is None or episode.demonstration is not None or not np.array_equal(move.goal, self._goal)
-        self._goal = move.goal
         if move.origin == "imitate":
-            self._imitated.append(distance)
-        elif begins:
-            self._missed_by.append(distance)
-        else:
-            self._missed_by[-1] = min(distance, self._missed_by[-1])
+            self._imitated.append(float(np.linalg.norm(episode.outcome - move.goal)))
+        elif move.origin != "global":
+            self._own.add(episode.index, move.goal, episode.outcome)
 
     def curves(self) -> dict[str, float]:
         """Values of the curves by tag: shares and means since the last call, counts since the first movement."""
@@ -67,8 +60,8 @@ class Behaviour:
         if self._imitated:
             values["teacher/missed_by"] = float(np.mean(self._imitated))
             self._imitated.clear()
-        if self._missed_by:
-            missed_by = np.array(self._missed_by)
+        missed_by = self._own.recent(self._movements)
+        if len(missed_by):
             values["goals/reached"] = float((missed_by <= self.tolerance).mean())
             values["goals/missed_by"] = float(np.median(missed_by))
         return values

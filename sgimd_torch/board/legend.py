@@ -24,8 +24,9 @@ LEGEND: Final[Mapping[str, str]] = {
     "regime": "Share of each kind of movement since the last point: global exploration, local optimisation, imitation, "
     "babbling, rest, or failed movements.",
     "goals/met": "Share of the benchmark goals whose error is at most half the side of a benchmark tile.",
-    "goals/reached": "Share of the last 50 goals that a movement reached within the tolerance.",
-    "goals/missed_by": "Median over the last 50 goals of the distance UNIT from a goal to its nearest outcome.",
+    "goals/reached": "Share of the last 50 goals of the learner that a movement reached within the tolerance.",
+    "goals/missed_by": "Median over the last 50 goals of the learner of the distance UNIT from a goal to its nearest "
+    "outcome. Global exploration does not count.",
     "teacher/demonstrations": "Number of demonstrations so far.",
     "teacher/replies": "Number of requests so far that a teacher replied to with a demonstration.",
     "teacher/missed_by": "Mean distance UNIT from a demonstrated outcome to the outcomes of its imitations, since the "

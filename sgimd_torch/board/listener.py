@@ -24,7 +24,6 @@ from sgimd_torch.evaluation import Benchmark, Evaluation
 from sgimd_torch.spaces import Box, Episode
 
 EVERY: Final = 50  # number of movements from one point of a curve to the next
-METRIC: Final = "error/mean"  # tag of the result on TensorBoard's page of hyperparameters
 
 
 class BoardListener(EventFile):
@@ -48,10 +47,12 @@ class BoardListener(EventFile):
         self._config, self._learner, self._seconds, self._curves = parts.config, parts.learner, seconds, curves
         self._space: Box = parts.environment.outcomes
         self._benchmark: Benchmark = parts.benchmark
-        self._behaviour = Behaviour(parts.learner.problem.tolerance)
+        self._behaviour = Behaviour(parts.learner.problem.tolerance, parts.config.at_once)
         self._movements = self._drawn_at = self._changes = 0
         self._explained: set[str] = set()
-        for each in summary.hparams(hparams_of(parts.config), {METRIC: math.nan})[:2]:  # the third marks the end
+        # The result on TensorBoard's page of hyperparameters.
+        result = "error/mean" if parts.config.evaluations else "goals/missed_by"
+        for each in summary.hparams(hparams_of(parts.config), {result: math.nan})[:2]:  # the third marks the end
             self.add(0, each)
         self.add(0, summary.text("about/legend", page(self._space.unit)))
 

@@ -139,8 +139,8 @@ def read(text: str, kind: Any) -> Any:
         return read(text, inner[0])
     if kind is bool:
         return bool(("false", "true").index(text))
-    if not text:
-        raise ValueError("nothing was typed")
+    if not text or (kind in (int, float) and "_" in text):  # Python would read 1_0 as 10
+        raise ValueError(f"{text!r} is not {wanted(kind)}")
     return kind(text)
 
 

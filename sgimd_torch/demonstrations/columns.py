@@ -163,7 +163,8 @@ def _numbers(table: Table, name: str, rows: slice) -> Array:
             raise ValueError(f"{name} must be numbers: {error}") from error
     for row, text in enumerate(values.tolist(), rows.start):
         if NUMBER.fullmatch(text) is None:
-            hint = "is a field missing?" if row else "does the first row name the columns? Then leave out --columns"
+            named = text == name
+            hint = "the first row names the columns, so leave out --columns" if named else "is a field missing?"
             raise ValueError(f"row {table.rows[row]}: {name} is {text[:40]!r}, no number; {hint}")
     return np.array([float(text.replace(",", ".")) for text in values.tolist()])
 

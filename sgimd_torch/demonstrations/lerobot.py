@@ -125,7 +125,11 @@ def _columns(file: Path, names: list[str]) -> dict[str, np.ndarray]:
         groups = [about.row_group(k) for k in range(about.num_row_groups)]
         chunks = [group.column(k) for group in groups for k in range(group.num_columns)]
         wanted = tuple(f"{name}." for name in names)
-        check_density(sum(8 * c.num_values for c in chunks if f"{c.path_in_schema}.".startswith(wanted)), file)
+        read = [chunk for chunk in chunks if f"{chunk.path_in_schema}.".startswith(wanted)]
+        for chunk in read:
+            if chunk.physical_type.endswith("BYTE_ARRAY"):  # few bytes may stand for any number of long texts
+                raise ValueError(f"{chunk.path_in_schema} has no numbers")
+        check_density(sum(8 * chunk.num_values for chunk in read), file)
         table = pyarrow.parquet.read_table(file, columns=names, page_checksum_verification=True)
         return {name: np.array(table.column(name).to_pylist()) for name in names}
     except (

@@ -107,11 +107,11 @@ def _split(lines: Sequence[str], mark: str) -> Rows:
         raise ValueError(f"it is no table: {error}") from error
 
 
-def _numbers_of(rows: Rows) -> tuple[int, int]:
-    """Order of ways to divide a table: numbers minus other fields, then all fields; without numbers, all fields."""
+def _numbers_of(rows: Rows) -> tuple[bool, int, int]:
+    """Order of ways to divide a table: any numbers, then numbers minus other fields; without numbers, all fields."""
     fields = [text for row in rows for text in row]
     numbers = sum(NUMBER.fullmatch(text) is not None for text in fields)
-    return (2 * numbers - len(fields) if numbers else 0), len(fields)
+    return numbers > 0, (2 * numbers - len(fields) if numbers else 0), len(fields)
 
 
 def _all_numbers(row: Sequence[str]) -> bool:

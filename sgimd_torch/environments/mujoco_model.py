@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 
 from sgimd_torch.catalogue import did_you_mean
+from sgimd_torch.files import check_regular
 from sgimd_torch.spaces import Array, Box, stream
 
 _COUNTS: Final = {"site": "nsite", "body": "nbody", "geom": "ngeom", "joint": "njnt"}
@@ -69,7 +70,7 @@ def load_model(path: Path, joints: Sequence[str]) -> tuple[mujoco.MjModel, list[
         ValueError: MuJoCo refuses the file, or there is nothing that moves.
         OSError: there is no such file.
     """
-    path.open("rb").close()  # MuJoCo's own message of a missing file is no OSError
+    check_regular(path)  # MuJoCo's own message of a missing file is no OSError
     try:
         spec = mujoco.MjSpec.from_file(str(path))
         for mesh in spec.meshes:

@@ -208,7 +208,7 @@ def _crossing(above: Array, below: Array) -> Array:
 def _model(path: Path, line: float) -> mujoco.MjModel:
     """The model in ``path``, with length and mass of each segment of the line multiplied by ``line``."""
     if line == 1:
-        return mujoco.MjModel.from_xml_path(str(path))
+        return _damped(mujoco.MjModel.from_xml_path(str(path)))
     spec = mujoco.MjSpec.from_file(str(path))
     for body in spec.bodies:
         if body.name == "float" or body.name.startswith("line_"):
@@ -216,4 +216,18 @@ def _model(path: Path, line: float) -> mujoco.MjModel:
         for geom in body.geoms:
             if geom.name.startswith("line_"):
                 geom.fromto, geom.mass = line * geom.fromto, line * geom.mass
-    return spec.compile()
+    return _damped(spec.compile())
+
+
+def _damped(model: mujoco.MjModel) -> mujoco.MjModel:
+    """The model with the damping that MuJoCo gives its servos from 3.15 on; before, it took less of the arm's inertia.
+
+    Damping is critical for the inertia that each joint of the arm has at zero angles while all others are free.
+    """
+    data, inverse = mujoco.MjData(model), np.zeros((model.nv, model.nv))
+    mujoco.mj_forward(model, data)
+    mujoco.mj_solveM(model, data, inverse, np.eye(model.nv))
+    servos = np.flatnonzero(model.actuator_biasprm[:, 1])
+    inertias = 1 / np.diag(inverse)[model.jnt_dofadr[model.actuator_trnid[servos, 0]]]
+    model.actuator_biasprm[servos, 2] = -2 * np.sqrt(model.actuator_gainprm[servos, 0] * inertias)
+    return model

@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple, ParamSpec, TypeVar
 
 import numpy as np
-from scipy.linalg.lapack import dpotrf, dpotri, dpotrs
+from scipy.linalg.lapack import dormqr, dpotrf, dpotri, dpotrs, dsytrd
 from scipy.optimize import minimize
 from threadpoolctl import ThreadpoolController
 
@@ -103,10 +103,16 @@ def choose_kernel(groups: Sequence[tuple[Array, Array]], noise: float) -> Kernel
     noises = np.array(_NOISES if noise > 0 else [_LEAST])
     grid = np.array([(scale, *rough, 0.0) for scale, rough in itertools.product(_SCALES, _ROUGH)])
     scores = np.zeros((len(grid), len(noises)))
+    kernels = compiled("sgimd_torch.inverses.kernels")
     for inputs, outcomes in groups:
-        deviations = np.ascontiguousarray((outcomes - outcomes.mean(axis=0)).T)
-        inputs = np.ascontiguousarray(inputs.T)
-        scores += compiled("sgimd_torch.inverses.kernels").scores(inputs, deviations, grid, noises, float(noise))
+        deviations, inputs = outcomes - outcomes.mean(axis=0), np.ascontiguousarray(inputs.T)
+        for row, kernel in zip(scores, grid, strict=True):
+            covariance, _ = kernels.correlations(inputs, kernel)
+            # Tridiagonal once, so that each noise is cheap: turned by reflections of all movements but the first.
+            below, diagonal, beside, lengths, _ = dsytrd(covariance, lower=True)
+            others, _, _ = dormqr("L", "T", below[1:, :-1], lengths, deviations[1:], 64 * deviations.shape[1])
+            turned = np.concatenate((deviations[:1], others)).T.copy()
+            row += kernels.scores(diagonal, beside, turned, noises, float(noise))
     kernel, found = np.unravel_index(scores.argmax(), scores.shape)
     scale, finer, share, _ = grid[kernel].tolist()
     return Kernel(scale, finer, share, float(noises[found]))

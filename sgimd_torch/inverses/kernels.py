@@ -159,6 +159,14 @@ def expected(process: Process, covariance: Array) -> Array:
 
 
 @inner
+def prediction(process: Process, here: Array) -> tuple[Array, float]:
+    """Expected outcome of a movement with the input ``here`` ``(dim,)``, and its variance, without noise."""
+    covariance, slope = np.empty(process.inputs.shape[1]), np.empty(process.inputs.shape[1])
+    covariances(process.inputs, process.kernel, here, covariance, slope)
+    return expected(process, covariance), unknown(process, covariance)
+
+
+@inner
 def expected_error(process: Process, goal: Array, doubt: float, covariance: Array, limit: float) -> float:
     """Expected squared error, the variance times ``doubt`` included; any number above ``limit`` if it is larger."""
     error = squared_distance(expected(process, covariance), goal)
@@ -239,9 +247,9 @@ def answer(
     units: Array,
     spreads: Array,
     box: Array,
-) -> Array:
+) -> tuple[Array, Array, float]:
     """theta of the candidate with the least expected squared error; that of the nearest exemplar, unless another one is
-    clearly better.
+    clearly better. Also its expected outcome, and the standard deviation from that, noise included.
 
     Args:
         near: ``(k,)`` rows of the nearest outcomes, nearest first.
@@ -289,49 +297,43 @@ def answer(
         error, found = descend(process, thetas[row], context, goal, doubt, units, spreads, box)
         if error < least:
             least, best = error, found
-    return best.copy() if least < CLEARLY * nearest else thetas[near[0]].copy()
+    best = best.copy() if least < CLEARLY * nearest else thetas[near[0]].copy()
+    outcome, variance = prediction(process, in_lengths(best, context, units))
+    return best, outcome, np.sqrt(max(1.0, surprise) * (variance + process.variance * noise))
 
 
 @called(TABLE, TABLE, ROWS, NUMBERS, NUMBERS)
 def foretell(inputs: Array, outcomes: Array, rows: np.ndarray, here: Array, kernel: Array) -> tuple[Array, float]:
     """Expected outcome of a movement, and its variance, by the process of the movements in ``rows``."""
-    process = fitted(columns(inputs, rows), columns(outcomes, rows), kernel)
-    covariance, slope = np.empty(len(rows)), np.empty(len(rows))
-    covariances(process.inputs, kernel, here.copy(), covariance, slope)
-    return expected(process, covariance), unknown(process, covariance)
+    return prediction(fitted(columns(inputs, rows), columns(outcomes, rows), kernel), here.copy())
 
 
-@called(TABLE, TABLE, TABLE, NUMBERS, NUMBER)
-def scores(inputs: Array, outcomes: Array, kernels: Array, noises: Array, stated: float) -> Array:
-    """Log likelihoods ``(kernels, noises)`` of movements under each kernel with each noise, see `choose_kernel`.
+@called(NUMBERS, NUMBERS, TABLE, NUMBERS, NUMBER)
+def scores(diagonal: Array, beside: Array, outcomes: Array, noises: Array, stated: float) -> Array:
+    """Log likelihoods ``(noises,)`` of movements with each noise, see `choose_kernel`.
 
     Args:
-        inputs: ``(dim, n)``, in lengths.
-        outcomes: ``(outcome_dim, n)``, of mean 0.
-        kernels: ``(kernels, 4)``, see `Process`; their noise is not used.
+        diagonal, beside: ``(n,)`` and ``(n - 1,)``, covariance matrix without noise, turned so that it is tridiagonal.
+        outcomes: ``(outcome_dim, n)``, of mean 0, turned likewise.
         noises: ``(noises,)``, variances relative to the kernel's.
         stated: standard deviation of the noise, as the environment states it.
     """
     m, n = outcomes.shape
-    found = np.empty((len(kernels), len(noises)))
-    for g in range(len(kernels)):
-        (covariance, _), noise = correlations(inputs, kernels[g]), 0.0
-        for a in range(len(noises)):
-            for i in range(n):
-                covariance[i, i] += noises[a] - noise
-            noise = noises[a]
-            factor = np.ascontiguousarray(np.linalg.cholesky(covariance))
-            total, logs = 0.0, 0.0
+    found = np.empty(len(noises))
+    for a in range(len(noises)):
+        white, pivot = outcomes[:, 0].copy(), diagonal[0] + noises[a]
+        total, logs = white @ white / pivot, np.log(pivot)
+        for i in range(1, n):
+            ratio = beside[i - 1] / pivot
+            pivot = diagonal[i] + noises[a] - ratio * beside[i - 1]
+            logs += np.log(pivot)
             for k in range(m):
-                white = outcomes[k].copy()
-                solve_lower(factor, white)
-                total += white @ white
-            for i in range(n):
-                logs += np.log(factor[i, i])
-            variance = max(total / (n * m), TINY)
-            found[g, a] = -0.5 * m * (n * np.log(variance) + 2 * logs)
-            if stated > 0:
-                found[g, a] -= 2 * m * np.log(noise * variance / stated**2) ** 2 * n / 60
+                white[k] = outcomes[k, i] - ratio * white[k]
+                total += white[k] ** 2 / pivot
+        variance = max(total / (n * m), TINY)
+        found[a] = -0.5 * m * (n * np.log(variance) + logs)
+        if stated > 0:
+            found[a] -= 2 * m * np.log(noises[a] * variance / stated**2) ** 2 * n / 60
     return found
 
 

@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from sgimd_torch.inverses.gaussian_process import Kernel, choose_kernel, fit_lengths, one_thread
+from sgimd_torch.inverses.gaussian_process import choose_kernel, fit_lengths, one_thread
 from sgimd_torch.inverses.locally_linear import NEAR, LocallyLinear
 from sgimd_torch.inverses.nearest import near_goal
 from sgimd_torch.memory.compiled import compiled
@@ -52,8 +52,8 @@ class LocalProcess(Inverse):
         super().__init__(problem)
         self.memory, self.noise = problem.memory, problem.outcome_noise
         self._linear = LocallyLinear(problem)
-        self._fitted = 0  # exemplars at the last fit
-        self._kernel: Kernel | None = None  # None while all outcomes are equal
+        self._due = float(_FIRST)  # exemplars at the next fit
+        self._kernel: Array | None = None  # a `Kernel`; None while all outcomes are equal
 
     def __call__(self, context: Array, goal: Array) -> Estimate:
         """The answer, and the exemplars of the nearest outcomes, nearest first."""
@@ -67,7 +67,7 @@ class LocalProcess(Inverse):
         linear, _ = self._linear.correct(near[:NEAR], goal)
         inputs, kernels = self._inputs.keys.rows, compiled("sgimd_torch.inverses.kernels")
         alike = self._inputs.nearest(inputs[near[: kernels.STARTS]], _LEARNT)
-        theta = kernels.answer(
+        theta, expected, sd = kernels.answer(
             near,
             alike,
             inputs,
@@ -75,13 +75,13 @@ class LocalProcess(Inverse):
             memory.outcomes,
             context,
             goal,
-            np.array(self._kernel),
+            self._kernel,
             linear,
             self._units,
             self._spreads,
             memory.theta_range,
         )
-        return Estimate(theta, thetas, memory.outcomes[near], context)
+        return Estimate(theta, thetas, memory.outcomes[near], context, expected, sd)
 
     def predict(self, context: Array, theta: Array) -> Array | None:
         """Expected outcome ``(outcome_dim,)`` of ``theta``, from similar movements. While all outcomes are equal, the
@@ -93,24 +93,23 @@ class LocalProcess(Inverse):
         """The result of `predict`, and the variance of each dimension, without noise."""
         self._catch_up()
         if self._kernel is None:
-            return (self.memory.outcomes[-1], 0.0) if self._fitted else None
+            return (self.memory.outcomes[-1], 0.0) if self._due > _FIRST else None
         here = (np.concatenate((theta, context)) - self._units[0]) / self._units[1]
         (rows,) = self._inputs.nearest(here[None], _LEARNT)
         kernels = compiled("sgimd_torch.inverses.kernels")
-        return kernels.foretell(self._inputs.keys.rows, self.memory.outcomes, rows, here, np.array(self._kernel))
+        return kernels.foretell(self._inputs.keys.rows, self.memory.outcomes, rows, here, self._kernel)
 
     def learnt(self) -> Learnt | None:
         """What predictions are made from; None while there are too few exemplars, or all outcomes are equal."""
         self._catch_up()
-        return None if self._kernel is None else Learnt(self._inputs, self._units, np.array(self._kernel))
+        return None if self._kernel is None else Learnt(self._inputs, self._units, self._kernel)
 
     def _catch_up(self) -> None:
         """Add new exemplars; refit when the memory has grown by half."""
         n, wanted = len(self.memory), 0
-        size = float(_FIRST)
-        while size <= n:
-            wanted, size = int(size), size * _GROWTH
-        if wanted > self._fitted:
+        while self._due <= n:
+            wanted, self._due = int(self._due), self._due * _GROWTH
+        if wanted:
             self._fit(wanted)
         if self._kernel is not None and len(self._inputs.keys) < n:
             self._inputs.keys.append(self._scaled(len(self._inputs.keys)))
@@ -124,7 +123,7 @@ class LocalProcess(Inverse):
             self._fit_to(n, 0.0)
 
     def _fit_to(self, n: int, far: float) -> None:
-        self._fitted, self._kernel = n, None
+        self._kernel = None
         raw = np.concatenate((self.memory.thetas[:n], self.memory.contexts[:n]), axis=1)
         outcomes = self.memory.outcomes[:n]
         origin = np.where(np.abs(raw[0]) > far * _spreads(raw), raw[0], 0.0)
@@ -141,7 +140,7 @@ class LocalProcess(Inverse):
         groups = self._inputs.nearest(inputs[order[:_GROUPS]], _GROUP)
         varied = [rows for rows in groups if np.ptp(outcomes[rows], axis=0).any()]
         if varied:
-            self._kernel = choose_kernel([(inputs[rows], outcomes[rows]) for rows in varied], self.noise)
+            self._kernel = np.array(choose_kernel([(inputs[rows], outcomes[rows]) for rows in varied], self.noise))
 
     def _scaled(self, first: int) -> Array:
         """Inputs from row ``first`` on, in lengths."""

@@ -44,7 +44,7 @@ class Memory:
         # A key is a context followed by an outcome or by a theta; without contexts, outcomes and thetas are the keys.
         self._outcome_side = TreeNeighbours(Table(context_dim + outcome_dim) if context_dim else self._outcomes)
         self._policy_side = PolicyNeighbours(Table(context_dim + theta_dim) if context_dim else self._thetas)
-        self._range, self._ranged = np.stack((np.full(theta_dim, np.inf), np.full(theta_dim, -np.inf))), 0
+        self._range = np.stack((np.full(theta_dim, np.inf), np.full(theta_dim, -np.inf)))
 
     def __len__(self) -> int:
         return len(self._thetas)
@@ -67,10 +67,6 @@ class Memory:
     @property
     def theta_range(self) -> Array:
         """``(2, theta_dim)``, least and greatest value of each parameter so far; infinite for an empty memory."""
-        new, self._ranged = self.thetas[self._ranged :], len(self)
-        if len(new):
-            lowest, highest = self._range
-            self._range = np.stack((np.minimum(lowest, new.min(axis=0)), np.maximum(highest, new.max(axis=0))))
         return self._range
 
     def add(self, context: ArrayLike, theta: ArrayLike, outcome: ArrayLike) -> None:
@@ -136,6 +132,9 @@ class Memory:
         """Remember exemplars ``(n, dim)`` that another memory has checked."""
         for table, rows in ((self._contexts, contexts), (self._thetas, thetas), (self._outcomes, outcomes)):
             table.append(rows)
+        if len(thetas):
+            lowest, highest = self._range
+            self._range = np.array((np.minimum(lowest, thetas.min(axis=0)), np.maximum(highest, thetas.max(axis=0))))
         if self.context_dim:
             self._outcome_side.keys.append(np.concatenate((contexts, outcomes), axis=1))
             self._policy_side.keys.append(np.concatenate((contexts, thetas), axis=1))

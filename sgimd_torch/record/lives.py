@@ -7,10 +7,12 @@ from collections.abc import Callable
 
 from sgimd_torch.files import replacing
 from sgimd_torch.learner import Learner
+from sgimd_torch.learner.events import Kind
 from sgimd_torch.parts import Teacher
 from sgimd_torch.record import Record, ReplayError, RunError
 from sgimd_torch.record.replay import replay
 from sgimd_torch.spaces import Move
+from sgimd_torch.strategies import Remember
 
 
 def save_life(learner: Learner, path: str | os.PathLike[str]) -> None:
@@ -19,9 +21,17 @@ def save_life(learner: Learner, path: str | os.PathLike[str]) -> None:
     A movement whose outcome was not told yet is left out: after `load_life`, ask for this movement again.
 
     Raises:
+        ValueError: exemplars entered the memory without `Learner.add`, so no learner could repeat this life.
         OSError: ``path`` is a directory, or cannot be written.
     """
-    about = {"begun": learner.begun, "exemplars": len(learner.memory)}
+    counted = {Kind.MOVED, Kind.ADDED, *([Kind.SHOWN] if isinstance(learner.social, Remember) else [])}
+    lived = learner.begun + sum(event.kind in counted for event in learner.events())
+    if len(learner.memory) != lived:
+        raise ValueError(
+            f"the memory has {len(learner.memory)} exemplars, but {lived} were lived; were some added without "
+            "learner.add(), which records them?"
+        )
+    about = {"begun": learner.begun}
     with replacing(path) as partial, Record.make(partial, learner.problem.dims, about) as record:
         for event in learner.events():
             record.add(event)
@@ -45,8 +55,7 @@ def load_life(
         after: function that gets each movement, None at a rest, such as the refresh of a forward model in your loop.
 
     Raises:
-        ReplayError: this learner makes another movement, or ends with another memory. It has then lived a part of
-            that life; build a new learner.
+        ReplayError: this learner makes another movement. It has then lived a part of that life; build a new learner.
         RuntimeError: the learner has lived already.
         RunError: there is no record at ``path``, or the record is damaged or of another robot.
     """
@@ -59,11 +68,9 @@ def load_life(
             raise RunError(damage[table])
         if record.dims != dims:
             raise RunError(f"{path} has dims {record.dims} of context, theta, outcome, not {dims}; another robot?")
-        begun, exemplars = record.about.get("begun", 0), record.about.get("exemplars")
+        begun = record.about.get("begun", 0)
         if begun != learner.begun:
             raise ReplayError(f"{path} began with {begun} exemplars in memory, this learner began with {learner.begun}")
         for episode in replay(learner, record.events(), teacher=teacher):
             if after is not None:
                 after(episode.move)
-    if exemplars not in (None, len(learner.memory)):
-        raise ReplayError(f"{path} ended with another memory; were exemplars added without learner.add()?")

@@ -53,6 +53,7 @@ def open_run(parts: RunParts, *, resume: bool, accept_loss: bool = False) -> tup
         "versions": {**versions(forward=bool(parts.learner.problem.trained)), **sources(config, robot)},
         "robot": type(robot).__name__,
         "words": words(config),
+        "tolerance": parts.learner.problem.tolerance,
         "spaces": {n: [b.low.tolist(), b.high.tolist(), b.names, b.unit] for n, b in spaces.items()},
     }
     dims = robot.contexts.dim, robot.policies.dim, robot.outcomes.dim

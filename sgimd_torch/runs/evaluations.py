@@ -29,7 +29,10 @@ class Evaluations:
     Args:
         parts: parts of the run; their ``answers`` are evaluated.
         record: record of the run; movements of an evaluation are not recorded.
-        between: function to call before each movement of an evaluation; it may raise `KeyboardInterrupt`.
+        between: function to call between movements of an evaluation; it may raise `KeyboardInterrupt`.
+
+    Attributes:
+        made: number of movements of all evaluations so far, recorded ones included.
     """
 
     parts: RunParts
@@ -44,16 +47,17 @@ class Evaluations:
             movements: {word: _evaluation(np.array(each, dtype=np.float64)) for word, each in by_word.items()}
             for movements, by_word in rows.items()
         }
+        self.made = sum(map(self.size, self._found))
 
     @property
     def last(self) -> Evaluation | None:
         """The last evaluation of the run's own inverse model, None if there is none."""
         return self._found[max(self._found)][OWN] if self._found else None
 
-    @property
-    def made(self) -> int:
-        """Number of evaluations so far, recorded ones included."""
-        return len(self._found)
+    def size(self, movements: int) -> int:
+        """Number of movements of the evaluation after this number of ``movements``."""
+        different = len(set(map(id, self.parts.answers.values())))
+        return len(self.parts.benchmark.goals) * (different + self._repeats(movements))
 
     def after(self, movements: int) -> ByInverse | None:
         """The recorded evaluation after this number of movements, else a new evaluation of the present learner.
@@ -62,6 +66,7 @@ class Evaluations:
         """
         if movements not in self._found and len(self.parts.learner.memory):
             self._found[movements] = self._evaluate(movements)
+            self.made += self.size(movements)
             self._write(movements, self._found[movements])
         return self._found.get(movements)
 
@@ -70,16 +75,20 @@ class Evaluations:
 
         At each goal the noise is the same for all inverse models. The noise floor is measured for the run's own model.
         """
-        config, inverses = self.parts.config, self.parts.answers
+        inverses, repeats = self.parts.answers, self._repeats(movements)
         own, *others = inverses
-        repeats = config.repeats if config.due(movements, config.floors) else 0
-        judged: tuple[Any, ...] = self.parts.environment, self.parts.benchmark.goals, config.seed, movements
+        parts = self.parts
+        judged: tuple[Any, ...] = parts.environment, parts.benchmark.goals, parts.config.seed, movements
         how: dict[str, Any] = {"between": self.between}
         found = {own: evaluate(inverses[own], *judged, repeats=repeats, **how)}
         for word in others:
             same = inverses[word] is inverses[own]
             found[word] = found[own].without_noise if same else evaluate(inverses[word], *judged, repeats=0, **how)
         return found
+
+    def _repeats(self, movements: int) -> int:
+        config = self.parts.config
+        return config.repeats if config.due(movements, config.floors) else 0
 
     def _write(self, movements: int, found: ByInverse) -> None:
         """Add evaluations to the record, and the current regions of the goal model."""

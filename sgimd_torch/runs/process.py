@@ -16,8 +16,11 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
+from functools import partial
 from types import FrameType
 from typing import Any, Final, Self, TextIO
+
+from sgimd_torch.catalogue.options import read, wanted
 
 REPORT_EVERY: Final = 20.0  # s between two lines of progress if stderr is no terminal
 SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
@@ -82,9 +85,27 @@ def command(main: Callable[[Sequence[str]], int], argv: Sequence[str] | None = N
 
 
 def parser_of(name: str, about: str | None, **more: Any) -> argparse.ArgumentParser:
-    """A parser for the options of ``sgimd name``. Its help shows the text ``about`` with its line ends."""
+    """A parser for the options of ``sgimd name``. Its help shows the text ``about`` with its line ends.
+
+    Numbers, of ``type=int``, ``float`` or ``"numbers"`` with commas between, are read like those of ``sgimd run``.
+    """
     form = argparse.RawDescriptionHelpFormatter
-    return argparse.ArgumentParser(f"sgimd {name}", description=about, formatter_class=form, allow_abbrev=False, **more)
+    made = argparse.ArgumentParser(f"sgimd {name}", description=about, formatter_class=form, allow_abbrev=False, **more)
+    for word, kind in {int: int, float: float, "numbers": tuple[float, ...]}.items():
+        made.register("type", word, partial(typed, kind=kind))
+    return made
+
+
+def typed(text: str, kind: Any) -> Any:
+    """The value that a word of the command line stands for.
+
+    Raises:
+        ArgumentTypeError: the word is of another type than ``kind``.
+    """
+    try:
+        return read(text, kind)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"must be {wanted(kind)}, got {text.strip()!r}") from None
 
 
 def _sink() -> TextIO:

@@ -16,6 +16,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from sgimd_torch.evaluation import OwnGoals
 from sgimd_torch.files import checksum
 from sgimd_torch.learner.events import Kind
 from sgimd_torch.record import DERIVED, Record, RunError, layout
@@ -36,12 +37,14 @@ class Run:
         config: options by name.
         versions, files, words: entries of the table ``about``, see docs/runs.md.
         robot: name of the environment's class.
+        tolerance: distance, in the unit of T, at which a goal of the learner counts as met.
         spaces: boxes C, Pi and T, by the names "contexts", "policies" and "outcomes".
         summary: numbers of "movements" and of "failed" movements, whether the run is "finished", and seconds by part.
         changes: descriptions of the changes of the robot that the learner noticed.
         index: ``(n,)`` numbers of the movements, from 0.
         origin: ``(n,)`` origin of each movement, such as "local" or "imitate"; "" for a rest.
         demonstration: ``(n,)`` indices in ``demonstrations`` of what was shown just before each movement; -1: nothing.
+        failed: ``(n,)``, whether each movement failed.
         contexts, thetas, goals, outcomes: ``(n, dim)`` vectors of each movement; NaN stands for none.
         answers: columns of the table ``evaluations``, by inverse model.
         errors: columns of the errors at all goals in all evaluations.
@@ -78,6 +81,8 @@ class Run:
     predictions: Columns | None = None
     refreshes: Columns | None = None
     requests: Columns | None = None
+    failed: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, np.bool_))
+    tolerance: float = float("nan")
 
     @property
     def evaluation(self) -> dict[str, Array]:
@@ -97,6 +102,21 @@ class Run:
         now = (self.errors["movements"] == movements) & (self.errors["answer"] == answer)
         contexts = [self.errors[f"context_{k}"][now] for k in range(self.spaces["contexts"].dim)]
         return self.errors["error"][now], np.array(contexts).T.reshape(int(now.sum()), -1)
+
+    def own_goals(self) -> OwnGoals:
+        """How nearly the learner met the goals that it chose.
+
+        Imitations, global exploration, which does not aim at its goal, and failed movements are left out.
+        """
+        found = OwnGoals(self.config["at_once"])
+        own = (
+            np.isfinite(self.goals[:, 0])
+            & np.isfinite(self.outcomes[:, 0])
+            & ~np.isin(self.origin, ("imitate", "global"))
+        )
+        for row in np.flatnonzero(own).tolist():
+            found.add(row, self.goals[row], self.outcomes[row])
+        return found
 
     def chosen_goals(self) -> Array:
         """``(n, outcome_dim)`` goals that the learner chose, in order; a goal of successive movements is listed once.
@@ -129,7 +149,7 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         if seed is not None and int(seed[1]) != settings["seed"]:
             raise RunError(f"{path} holds a run of seed {settings['seed']}; was it copied from another run?")
         shown = record.demonstrations()
-        arrays, requests, failed = _lived(record)
+        arrays, requests = _lived(record)
         found: dict[str, Columns] = {table: _columns(record, table) for table in DERIVED}
         n = record.movements
     evaluated = found["evaluations"]["movements"]
@@ -142,8 +162,14 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         files=about["files"],
         robot=about["robot"],
         words=about["words"],
+        tolerance=about.get("tolerance", float("nan")),
         spaces={name: Box(*box) for name, box in about["spaces"].items()},
-        summary={"movements": n, "failed": failed, "finished": bool(finished), **about.get("seconds", {})},
+        summary={
+            "movements": n,
+            "failed": int(arrays["failed"].sum()),
+            "finished": bool(finished),
+            **about.get("seconds", {}),
+        },
         **arrays,
         answers=_by_answer(found["evaluations"]),
         errors=found["errors"],
@@ -160,12 +186,12 @@ def _if_any(columns: Columns) -> Columns | None:
     return columns if len(next(iter(columns.values()))) else None
 
 
-def _lived(record: Record) -> tuple[dict[str, Any], Columns | None, int]:
-    """Movements as arrays by attribute of `Run`, requests as columns or None, and the number of failed movements."""
+def _lived(record: Record) -> tuple[dict[str, Any], Columns | None]:
+    """Movements as arrays by attribute of `Run`, and requests as columns or None."""
     c, p, t = record.dims
     origins, shown, cells, requests = list[str](), array("q"), array("d"), list[dict[str, Any]]()
-    changes = list[str]()
-    lessons, failed = dict[int, int](), 0  # lessons by number of the next movement of the robot that was shown them
+    changes, failed = list[str](), list[bool]()
+    lessons = dict[int, int]()  # lessons by number of the next movement of the robot that was shown them
     for _, kind, origin, *vectors, lesson, who, strategy, reply, place in record.rows("events"):
         if lesson is not None:
             lessons[len(origins) + place] = lesson
@@ -178,21 +204,17 @@ def _lived(record: Record) -> tuple[dict[str, Any], Columns | None, int]:
         elif kind == Kind.CHANGED:
             changes.append(reply)
         elif kind in (Kind.MOVED, Kind.RESTED, Kind.FAILED):
-            failed += kind == Kind.FAILED
+            failed.append(kind == Kind.FAILED)
             shown.append(lessons.pop(len(origins), -1))
             origins.append(origin or "")
             cells.extend(np.nan if value is None else value for value in vectors)
     n = len(origins)
     vectors_of = np.split(np.array(cells).reshape(n, c + p + 2 * t), (c, c + p, c + p + t), axis=1)
-    found: dict[str, Any] = {
-        "changes": changes,
-        "index": np.arange(n),
-        "origin": np.array(origins, np.str_),
-        "demonstration": np.array(shown, np.int64),
-    }
+    found: dict[str, Any] = {"changes": changes, "failed": np.array(failed, np.bool_), "index": np.arange(n)}
+    found |= {"origin": np.array(origins, np.str_), "demonstration": np.array(shown, np.int64)}
     found |= dict(zip(("contexts", "thetas", "goals", "outcomes"), vectors_of, strict=True))
     columns = {name: np.array([each[name] for each in requests]) for name in requests[0]} if requests else None
-    return found, columns, failed
+    return found, columns
 
 
 def _columns(record: Record, table: str) -> Columns:

@@ -93,7 +93,7 @@ class Life:
 
             board = BoardListener(parts.config.directory, parts, self.seconds.summary, self._curves)
             self.listeners.append(board)
-        self._wanted = set(parts.config.evaluations)
+        self._wanted = {each: self.evaluations.size(each) for each in parts.config.evaluations}  # by movements before
         self._committed = time.monotonic()
 
     def __enter__(self) -> Self:
@@ -144,7 +144,7 @@ class Life:
                 last = self.evaluations.last
                 note = "" if last is None else f"error {unit(last.mean_error, '.4f')}"
                 spent = self.seconds.summary()["seconds_evaluation"]
-                progress.show(self.movements, note, spent=spent - before, later=self._later(spent))
+                progress.show(self.movements, note, spent=spent - before, later=self._later)
                 if self.movements == self.recorded < total:
                     progress.begin(title, total, self.movements)
                     before = spent
@@ -194,9 +194,17 @@ class Life:
             while not self._settle():
                 time.sleep(COMMIT_EVERY)
 
-    def _later(self, spent: float) -> float:
-        """Time (s) that the evaluations to come will take, if each takes as long as the mean of those so far."""
-        return spent / max(self.evaluations.made, 1) * len(self._wanted)
+    @property
+    def _later(self) -> float:
+        """Time (s) of the evaluations to come, if their movements take as long as those of the evaluations so far.
+
+        Before the first evaluation: as long as those of the run.
+        """
+        if self.replaying:
+            return 0.0
+        seconds, made = self.seconds.summary(), self.evaluations.made
+        each = seconds["seconds_evaluation"] / made if made else seconds["seconds_physics"] / self.movements
+        return each * sum(self._wanted.values())
 
     def _stop_if(self, stopping: Stopping) -> None:
         """Stop between two movements of the run or of an evaluation, if a signal was heard."""
@@ -226,9 +234,10 @@ class Life:
                 say(f"movement {episode.index} failed: {episode.failed}{more}")
         for each in self.listeners:
             each.episode(episode, replayed)
-        due = {each for each in self._wanted if each <= self.movements}
+        due = [moment for moment in self._wanted if moment <= self.movements]
         if due and self._all_told:
-            self._wanted -= due
+            for moment in due:
+                del self._wanted[moment]
             self._evaluate()
         if self.movements == self.recorded:
             self._begin()

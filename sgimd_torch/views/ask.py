@@ -20,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
+from sgimd_torch.catalogue.options import read
 from sgimd_torch.environments.motor_primitives import GaussianPrimitive
 from sgimd_torch.environments.protocol import primitive_of
 from sgimd_torch.files import write_text
@@ -62,21 +63,16 @@ def parser() -> argparse.ArgumentParser:
     """The options of ``sgimd ask``."""
     parser = parser_of("ask", __doc__)
     parser.add_argument("run", type=Path, help="directory of a run: OUT/NAME/seed-003")
-    parser.add_argument("--goal", type=numbers, action="append", default=[], metavar="X,Y", help="point of T")
+    parser.add_argument("--goal", type="numbers", action="append", default=[], metavar="X,Y", help="point of T")
     parser.add_argument("--goals", type=Path, metavar="FILE", help="table of goals, with commas, one goal a line")
     middle = "context of all goals (default: the middle of C)"
-    parser.add_argument("--context", type=numbers, metavar="X,Y", help=middle)
+    parser.add_argument("--context", type="numbers", metavar="X,Y", help=middle)
     parser.add_argument("--execute", action="store_true", help="execute each answer on the robot of the run")
     parser.add_argument("--out", type=Path, metavar="FILE", help="csv file to write, with a line for each goal")
     joints = "csv file to write: time (s) and joints (rad) or commands, 50 times a second"
     parser.add_argument("--trajectory", type=Path, metavar="FILE", help=joints)
     parser.add_argument("--trust", action="store_true", help="execute the user's code that the settings of RUN name")
     return parser
-
-
-def numbers(text: str) -> list[float]:
-    """A point on the command line, such as "0.3,0.6". Error messages of argparse have the name of this function."""
-    return [float(word) for word in text.split(",")]
 
 
 def _answers(
@@ -105,7 +101,7 @@ def _read(path: Path, box: Box) -> list[list[float]]:
     found = list[list[float]]()
     for number, row in enumerate(rows):
         try:
-            found.append([float(cell) for cell in row])
+            found.append([read(cell, float) for cell in row])
         except ValueError as error:
             if number:
                 raise ValueError(

@@ -24,8 +24,8 @@ from pathlib import Path
 
 import numpy as np
 
-from sgimd_torch.evaluation import TILES, Benchmark, save_benchmark, tile_goals, tile_side
-from sgimd_torch.runs.process import parser_of, printable, say
+from sgimd_torch.evaluation import TILES, Benchmark, save_benchmark, tile_goals, tile_side, tile_sides
+from sgimd_torch.runs.process import parser_of, say
 from sgimd_torch.runs.read import Run, find_runs, read_run
 from sgimd_torch.spaces import Box, check_count, stream
 
@@ -53,10 +53,15 @@ def main(argv: Sequence[str] | None = None) -> int:
         )
     save_benchmark(options.out, Benchmark(name, goals, side))
     n, made = len(goals), f"{len(outcomes)} movements of {len(runs)} run{'s' * (len(runs) > 1)}"
-    print(printable(f"{n} goals, on tiles of {tile} reached by {made}: {options.out}"))
-    if n < options.tiles / 2:
-        why = f"tiles smaller than {tile} would be smaller than the finest allowed, or seldom reached twice"
-        say(f"only {n} goals were made, {options.tiles} were requested: {why}; longer runs give more")
+    print(f"{n} goals, on tiles of {tile} reached by {made}: {options.out}")
+    (finest, *_, largest), asked = tile_sides(outcomes, box), f"{options.tiles} goals were requested, and {n} made"
+    if n > 2 * options.tiles and side > 0.9 * largest:
+        say(f"{asked}: no tiles are larger than {box.amount(largest)}; runs that reach less of T give fewer")
+    elif n < options.tiles / 2 and side < 1.1 * finest:
+        least = box.amount(finest)
+        say(f"{asked}: no tiles are smaller than {least}; a smaller T or runs that reach more of it give more")
+    elif n < options.tiles / 2:
+        say(f"{asked}: tiles smaller than {tile} were seldom reached twice; longer runs give more")
     return 0
 
 

@@ -38,9 +38,10 @@ from sgimd_torch.demonstrations.fit import beyond_limits, misfit_of
 from sgimd_torch.demonstrations.text import read_text
 from sgimd_torch.demonstrations.units import in_units, paced
 from sgimd_torch.environments.protocol import SimulationError, execute_many, primitive_of
+from sgimd_torch.files import check_regular
 from sgimd_torch.runs.build import task_of
 from sgimd_torch.runs.command_line import parse
-from sgimd_torch.runs.process import parser_of, say
+from sgimd_torch.runs.process import parser_of, say, typed
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.runs.tasks.taught import Replaying, theta_of
 from sgimd_torch.spaces import Array, Box, Demonstration, stream
@@ -133,8 +134,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     importing = options.command == "import"
     if importing and options.out.suffix != ".npz":
         raise ValueError(f"--out must end in .npz, got {options.out}")
-    if not options.source.is_file() and not options.source.is_dir():
-        raise FileNotFoundError(f"there is no {options.source}")
+    check_regular(options.source)
     task = None
     if options.environment:
         task = task_of(parse([f"--environment={options.environment}", *of_robot])[0])
@@ -278,7 +278,7 @@ def _units(text: str) -> dict[str, str]:
 
 
 def _above_zero(text: str) -> float:
-    value = float(text)
+    value = typed(text, float)
     if not 0 < value < np.inf:
         raise argparse.ArgumentTypeError(f"must be above 0, got {text}")
     return value

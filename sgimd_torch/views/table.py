@@ -4,15 +4,19 @@ RUNS is a folder of variants (OUT), of one variant (OUT/NAME), or of one run (OU
 after --at movements; the default is the last number of movements at which all finished runs were evaluated. Runs
 without this evaluation are left out, and named below the table. The worst variant comes first.
 
-Errors and noise floors are means over seeds, in the unit of T. With 5 seeds or more, the number after ± is the standard
-deviation of the errors over seeds. Times are milliseconds per movement.
+An error is the mean distance to the goals of the evaluation, in the unit of T; beside it is the median over the goals,
+which a few goals missed by far do not move. All numbers are interquartile means over seeds, as in a report. With 5
+seeds or more, the brackets have the 95 % bootstrap interval. Times are milliseconds per movement.
 
---baseline adds a column: the error minus that of the baseline, as interquartile mean over common seeds.
-With 5 seeds or more, the brackets have its 95 % bootstrap interval. A number below 0 is better than the baseline.
+If no run was evaluated, the table shows how nearly the learners met the last 50 goals that they chose themselves: the
+median distance, the share met within the tolerance, and the share of all movements that failed.
+
+--baseline adds a column: the error minus that of the baseline, over common seeds. A number below 0 is better.
 
   sgimd table runs
   sgimd table study --at 2000                      before all runs are finished
   sgimd table study --baseline goals=interest-map  with differences from this variant
+  sgimd table study --format latex                 for a paper; csv has all digits, and columns for the intervals
 
 Exit code: 0 a table was printed, 2 there is nothing to show.
 """
@@ -23,15 +27,13 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-
 from sgimd_torch.record import RunError
 from sgimd_torch.runs.process import parser_of, say
 from sgimd_torch.runs.read import Run
-from sgimd_torch.spaces import Array
-from sgimd_torch.views.statistics import LEAST_SEEDS, show
-from sgimd_torch.views.text_table import print_table
-from sgimd_torch.views.variants import EARLY, Variant, baseline_of, best_first, compare, read, unit_of
+from sgimd_torch.views.results import Column, results
+from sgimd_torch.views.statistics import LEAST_SEEDS
+from sgimd_torch.views.text_table import print_csv, print_latex, print_table
+from sgimd_torch.views.variants import Variant, baseline_of, best_first, compare, read, unit_of
 
 
 def parser() -> argparse.ArgumentParser:
@@ -40,6 +42,9 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument("runs", type=Path, metavar="RUNS", help="folder of a run, of a variant or of several variants")
     parser.add_argument("--at", type=int, metavar="MOVEMENTS", help="number of movements at which to compare")
     parser.add_argument("--baseline", metavar="NAME", help="variant to compare the others with, seed by seed")
+    parser.add_argument(
+        "--format", choices=("text", "csv", "latex"), default="text", help="form of the table (default: %(default)s)"
+    )
     return parser
 
 
@@ -51,31 +56,34 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     options = parser().parse_args(argv)
     found = read(options.runs)
-    at = options.at or _last_common([run for runs in found.values() for run in runs if run.summary["finished"]])
-    every = best_first(Variant(name, runs, at) for name, runs in found.items())
-    variants = [variant for variant in every if variant.used][::-1]
+    runs = [run for each in found.values() for run in each]
+    evaluated = options.at or options.baseline or any(len(run.evaluation["movements"]) for run in runs)
+    at = options.at or (_last_common([run for run in runs if run.summary["finished"]]) if evaluated else None)
+    every = best_first(Variant(name, each, at) for name, each in found.items())
+    variants = [variant for variant in every if variant.used or not evaluated][::-1]
     left_out = [
         f"{run.path} was not evaluated after {at} movements, it has {len(run.index)} of {run.config['movements']}"
         for variant in every
         for run in variant.runs
-        if run not in variant.used
+        if evaluated and run not in variant.used
     ]
     if not variants:
         raise RunError("\n".join(["there is nothing to compare; is --at a number that was evaluated?", *left_out]))
-    unit = unit_of(variants)
-    errors = (f"error at {EARLY}", unit(f"at {at}"), "noise floor")
-    table: list[tuple[str, ...]] = [
-        ("variant", "seeds", *errors, "physics (ms)", "learning (ms)"),
-        *map(_row, variants),
-    ]
+    columns = results(variants)
     if options.baseline is not None:
         baseline = baseline_of(variants, options.baseline)
-        minus = {each.variant: show(each.found, "+.4f") for each in compare(variants, baseline)}
-        further = [f"minus {options.baseline}", *(minus.get(variant, "-") for variant in variants)]
-        table = [(*cells, cell) for cells, cell in zip(table, further, strict=True)]
-    print_table(table)
-    if few := [f"{variant.name} ({len(variant.used)})" for variant in variants if variant.few]:
-        say(f"fewer than {LEAST_SEEDS} seeds, too few for an interval or a deviation: {', '.join(few)}")
+        minus = {each.variant: each.found for each in compare(variants, baseline)}
+        head = unit_of(variants)(f"minus {options.baseline}")
+        columns.append(Column(head, [minus.get(variant) for variant in variants], "+.4f"))
+    names = [variant.name for variant in variants]
+    if options.format == "csv":
+        parts = [part for column in columns for part in column.parts()]
+        print_csv(zip(["variant", *names], *parts, strict=True))
+    else:
+        rows = list(zip(["variant", *names], *([each.head, *each.texts()] for each in columns), strict=True))
+        (print_latex if options.format == "latex" else print_table)(rows)
+    if few := [f"{variant.name} ({len(variant.used or variant.runs)})" for variant in variants if variant.few]:
+        say(f"fewer than {LEAST_SEEDS} seeds, too few for an interval: {', '.join(few)}")
     say(*(f"left out: {reason}" for reason in left_out))
     return 0
 
@@ -93,20 +101,3 @@ def _last_common(runs: Sequence[Run]) -> int:
             raise RunError("no finished run was evaluated; were they made with --evaluate-at '[]'?")
         raise RunError("finished runs were never evaluated after the same number of movements; choose one with --at")
     return int(max(common))
-
-
-def _row(variant: Variant) -> tuple[str, ...]:
-    errors = variant.values(variant.last)
-    milliseconds = 1e3 / np.mean([run.summary["movements"] for run in variant.used])
-    return (
-        variant.name,
-        str(len(errors)),
-        _mean(variant.values(EARLY)),
-        _mean(errors) + ("" if variant.few else f" ± {errors.std(ddof=1):.3f}"),
-        _mean(variant.values(variant.last, "noise_floor")),
-        *(f"{milliseconds * variant.seconds(part):.2f}" for part in ("physics", "learner")),
-    )
-
-
-def _mean(lengths: Array) -> str:
-    return f"{lengths.mean():.3f}" if np.isfinite(lengths.mean()) else "-"

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from sgimd_torch.catalogue import unknown
+from sgimd_torch.evaluation import RECENT
 from sgimd_torch.figures.names import label
 from sgimd_torch.runs.directory import FILE
 from sgimd_torch.runs.process import say
@@ -26,6 +27,7 @@ from sgimd_torch.spaces import Array
 from sgimd_torch.views.statistics import LEAST_SEEDS, Interval, common_differences, over_seeds
 
 EARLY: Final = 1000  # number of movements after which tables show an early error
+POINTS: Final = 40  # largest number of points of a curve of own goals
 USUAL: Final = "sgim-d"  # name of the default baseline
 
 
@@ -95,7 +97,7 @@ class Variant:
     @property
     def few(self) -> bool:
         """Whether the variant has too few seeds for intervals."""
-        return len(self.used) < LEAST_SEEDS
+        return len(self.used or self.runs) < LEAST_SEEDS
 
     @cached_property
     def errors(self) -> Array:
@@ -117,6 +119,32 @@ class Variant:
     def last_error(self) -> Interval | None:
         """The error (m) at the evaluation where variants are compared, ``last``."""
         return self.at(self.last)
+
+    @cached_property
+    def own(self) -> OwnCurve:
+        """How nearly the learners met their own goals; of all runs, up to the length of the shortest."""
+        length = min(len(run.index) for run in self.runs)
+        movements = np.unique(np.linspace(0, length, POINTS + 1).astype(np.int64))
+        goals = [run.own_goals() for run in self.runs]
+        missed = [[each.recent(until) for until in movements.tolist()] for each in goals]
+        failed = [
+            [
+                float(run.failed[max(0, until - RECENT) : until].mean()) if until else np.nan
+                for until in movements.tolist()
+            ]
+            for run in self.runs
+        ]
+        met = [
+            [float((near <= run.tolerance).mean()) if len(near) else np.nan for near in row]
+            for run, row in zip(self.runs, missed, strict=True)
+        ]
+        medians = [[float(np.median(near)) if len(near) else np.nan for near in row] for row in missed]
+        return OwnCurve(movements, np.array(medians), np.array(met), np.array(failed))
+
+    @property
+    def failed(self) -> Array:
+        """``(n_seeds,)``, shares of the movements that failed."""
+        return np.array([run.summary["failed"] / max(run.summary["movements"], 1) for run in self.runs])
 
     @cached_property
     def landed(self) -> Array:
@@ -145,12 +173,43 @@ class Variant:
         return sorted(self.used, key=lambda run: run.at(self.last))[(len(self.used) - 1) // 2]
 
     def seconds(self, part: str) -> float:
-        """Mean over runs of the seconds spent on a ``part``: "physics", "learner" or "evaluation"."""
-        return float(np.mean([run.summary[f"seconds_{part}"] for run in self.used or self.runs]))
+        """Seconds that a movement took of a ``part``, "physics" or "learner": the mean over all movements of all runs.
+
+        The time of "physics" is that of the robot.
+        """
+        runs = [run.summary for run in self.used or self.runs]
+        return sum(run[f"seconds_{part}"] for run in runs) / max(sum(run["movements"] for run in runs), 1)
 
     def _over_time(self, column: str) -> Array:
         columns = [self.values(movements, column) for movements in self.evaluated.tolist()]
         return np.array(columns, dtype=np.float64).reshape(len(self.evaluated), len(self.used)).T
+
+
+@dataclass(frozen=True, eq=False)
+class OwnCurve:
+    """Results at the learners' own goals over time; NaN before the first goal.
+
+    Args:
+        movements: ``(n,)``, numbers of movements, from 0.
+        missed: ``(n_seeds, n)``, median distances missed at the last 50 goals before, in the unit of T.
+        met: ``(n_seeds, n)``, shares of these goals that were met within the tolerance of the run.
+        failed: ``(n_seeds, n)``, shares of the last 50 movements that failed.
+    """
+
+    movements: NDArray[np.int64]
+    missed: Array
+    met: Array
+    failed: Array
+
+    @property
+    def last_missed(self) -> Interval | None:
+        """Median distance missed at the last 50 goals; None if a learner chose no goal."""
+        return over_seeds(self.missed[:, -1])
+
+    @property
+    def last_met(self) -> Interval | None:
+        """Share of the last 50 goals that was met; None if a learner chose no goal."""
+        return over_seeds(self.met[:, -1])
 
 
 @dataclass(frozen=True, eq=False)

@@ -66,6 +66,19 @@ def test_a_goal_counts_once_and_as_reached_when_one_of_its_movements_came_near()
     assert values["goals/missed_by"] == pytest.approx((0.01 + np.hypot(1, 1.4)) / 2)
 
 
+def test_robots_that_move_at_once_share_no_goal_and_global_exploration_aims_at_none():
+    def told(at_once, *movements):
+        behaviour = Behaviour(0.02, at_once)
+        for index, (goal, outcome, origin) in enumerate(movements):
+            behaviour.episode(movement(index, goal, outcome, origin))
+        return behaviour.curves()
+
+    in_turn = [(GOAL, FAR, "local"), (-GOAL, FAR, "local"), (GOAL, NEAR, "local"), (-GOAL, FAR, "local")]
+    assert told(2, *in_turn)["goals/reached"] == 1 / 2
+    assert told(1, *in_turn)["goals/reached"] == 1 / 4
+    assert "goals/reached" not in told(1, (GOAL, NEAR, "global"))
+
+
 def test_imitations_count_for_the_teacher_and_not_as_goals_of_the_learners_own():
     behaviour = Behaviour(0.02)
     behaviour.episode(movement(0, GOAL, NEAR))
@@ -248,6 +261,17 @@ def test_a_board_depends_only_on_the_last_request(tmp_path, go, watched):
     directory = tmp_path / "sgim-d" / "seed-003"
     assert_same_board(directory, watched)
     assert curves_of(directory)["time/physics"].keys() == {150}  # nobody knows those of what was replayed
+
+
+def test_without_evaluations_there_are_curves_of_the_learners_own_goals_and_of_failures(own):
+    directory = Path("runs/practice/seed-000")
+    words = "--environment planar-arm-7 --algorithm practice --movements 150 --evaluate-at [] --board true --out runs"
+    assert command(main, words.split()) == 0
+    curves, goals = curves_of(directory), read_run(directory).own_goals()
+    for movements in (50, 100, 150):
+        assert curves["goals/missed_by"][movements] == pytest.approx(np.median(goals.recent(movements)))
+    assert not any(tag.startswith("error/") for tag in curves)
+    assert hparams_of(directory)[1] == ["goals/missed_by"]
 
 
 def live_as(robot, *options):

@@ -1,6 +1,7 @@
 """Recordings as people have them become demonstrations: text, LeRobot; and are checked against a robot."""
 
 import json
+import os
 import re
 
 import numpy as np
@@ -68,6 +69,9 @@ RIGHT = {
     "no time": (UNTIMED, f"{NAMED} --rate 2"),
     "no names, no time": (UNTIMED.partition("\n")[2], f"{NAMED} --rate 2 --columns b,a,x,y"),
     "no zero before the point": (ONE.replace("0.", "."), NAMED),
+    "a number for each row": (ONE.replace("\n", "\n7,")[:-2].replace("time", ",time", 1), NAMED),
+    "a comma at each end": (ONE.replace("\n", ",\n"), NAMED),
+    "ends of old machines": (ONE.replace("\n", "\r"), NAMED),
     "exponents": (ONE.replace("0.1", "1e-1").replace("0.7", "+7.0E-01"), NAMED),
     "degrees": (degrees(ONE), f"{NAMED} --unit deg"),
     "degrees by joint": (degrees(ONE), f"{NAMED} --unit a=deg,b=deg"),
@@ -88,7 +92,7 @@ REFUSED = {
     "names that were given, too": (
         ONE,
         f"{NAMED} --columns time,a,b,x,y",
-        "row 1: a is 'a', no number; does the first row name the columns",
+        "row 1: a is 'a', no number; the first row names the columns, so leave out --columns",
     ),
     "numbers for names": (f"0,1,2,3,4\n{BARE}", f"{NAMED} --columns time,a,b,x,y", "0,1,2,3,4, may number the columns"),
     "too few names": (BARE, f"{NAMED} --columns time,a,b,x", "it has no column y"),
@@ -97,6 +101,18 @@ REFUSED = {
     "a gap": (ONE.replace("0.3", ""), NAMED, "row 3: a is '', no number"),
     "no number": (ONE.replace("0.3", "nan"), NAMED, "row 3: a is 'nan', no number"),
     "a number of Python": (ONE.replace("0.3", "1_0"), NAMED, "row 3: a is '1_0', no number"),
+    "hexadecimals": (ONE.replace("0.3", "0x3"), NAMED, "row 3: a is '0x3', no number"),
+    "a minus that is none": (ONE.replace("0.1", "\u22120.1"), NAMED, "row 2: a is '\u22120.1', no number; is a field"),
+    "dates": ("time,a,b,x,y\n" + "1-1 9:00,0.1,0.2,9,-\n" * 2, NAMED, "row 2: y is '-', no number"),
+    "points and commas in a number": (
+        ONE.replace(",", ";").replace("0.3", "1.000,3"),
+        NAMED,
+        "row 3: a is '1.000,3', no number",
+    ),
+    "decimal commas between commas": (ONE.replace("0.", "0,"), NAMED, "row 2 has 7 fields instead of 5"),
+    "a remark between rows": (ONE.replace("\n2.5", "\n# lost\n2.5"), NAMED, "row 3 has 1 fields instead of 5"),
+    "a name over two lines": (ONE.replace("time", '"time\ns"'), NAMED, "it has no column"),
+    "a file of one sign": ("0" * 200_000, NAMED, "it is no table: field larger than"),
     "no end of digits": (ONE.replace("0.3", "9" * 400), NAMED, "row 3: a must be finite, got"),
     "a field without end": (ONE.replace("0.3", "9" * 200_000), NAMED, "it is no table: field larger than"),
     "times that fall": (ONE.replace("2.5", "1.5"), NAMED, "row 3: time must increase from row to row; were rows shuf"),
@@ -227,9 +243,16 @@ def test_recordings_that_cannot_be_used_are_named_and_left_out_when_asked(tmp_pa
 
 
 def test_folders_without_texts_and_places_without_a_file_are_refused(tmp_path, capsys):
-    for place, told in ((tmp_path, r"holds no \.csv, \.tsv, \.txt, \.dat file"), (tmp_path / "no.csv", "there is no ")):
-        assert sgimd("import", place, *NAMED.split(), "--out", tmp_path / "shown.npz") == 2
-        assert re.search(told, capsys.readouterr().err)
+    os.mkfifo(tmp_path / "pipe.npz")
+    for place, told in (
+        (".", r"holds no \.csv, \.tsv, \.txt, \.dat file"),
+        ("no.csv", r"no\.csv cannot be read or written: No such file"),
+        ("\udcff\x1b[31m\n.csv", r"'.*\\udcff\\x1b\[31m\\n\.csv' cannot be read or written: No such file"),
+        ("pipe.npz", "pipe.npz is a pipe or a device, not a file"),
+    ):
+        assert sgimd("import", tmp_path / place, *NAMED.split(), "--out", tmp_path / "shown.npz") == 2
+        said = capsys.readouterr().err
+        assert re.fullmatch(f"error: .*{told}.*\n", said), said
 
 
 def test_columns_are_checked_before_anything_is_read():
@@ -317,6 +340,18 @@ def last(root):
     return sorted((root / "data/chunk-000").iterdir())[-1]
 
 
+def rewritten(root, name, values):
+    """The last episode of a dataset has other values in one column."""
+    rows = pq.read_table(last(root))
+    columns = rows.slice(rows.num_rows - 5).to_pydict()
+    pq.write_table(pa.table({**columns, name: values}), last(root))
+
+
+def emptied(root):
+    """The last file of a dataset is small, and would fill the memory."""
+    pq.write_table(pa.table({"timestamp": np.zeros(2**25 + 1, np.int8)}), last(root))
+
+
 def moved_to_v1(root):
     (root / "meta").rename(root / "meta_data")
 
@@ -336,6 +371,13 @@ def moved_to_v1(root):
         (lambda root: (root / "meta/info.json").write_text("[]"), r"info\.json must hold an object"),
         (lambda root: [file.unlink() for file in last(root).parent.iterdir()], "were only its videos copied"),
         (lambda root: last(root).write_bytes(b"PAR1 of another kind"), r"\.parquet cannot be read"),
+        (
+            lambda root: rewritten(root, "timestamp", ["late"] * 5),
+            r"\.parquet cannot be read: timestamp has no numbers",
+        ),
+        (lambda root: rewritten(root, "timestamp", [0.0, 0.1, None, 0.3, 0.4]), r"row \d+: timestamp must be finite"),
+        (lambda root: rewritten(root, STATE, [[[0.0, 1.0], [1.0]]] * 5), r"\.parquet cannot be read: setting an array"),
+        (emptied, r"cannot be read: it would take \d+ bytes"),
         (lambda root: last(root).write_text(POINTER), r"\.parquet is a pointer of Git LFS, .*; git lfs pull gets"),
     ],
 )

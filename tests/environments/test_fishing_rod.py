@@ -256,6 +256,12 @@ def test_after_a_divergence_the_next_movement_is_the_same_as_without_it(rod: Fis
     assert np.array_equal(cast(fragile, theta), cast(rod, theta))
 
 
+def test_servos_are_damped_alike_by_every_mujoco():
+    """Up to 3.14 it derived another damping from the same model, and the float landed up to 2 cm elsewhere."""
+    damping = -FishingRod().model.actuator_biasprm[:6, 2]
+    assert damping == pytest.approx([13.5348418, 13.5646025, 12.4623754, 4.0018495, 4.1807261, 4.0836030], abs=1e-7)
+
+
 @pytest.mark.usefixtures("mujoco_log")
 def test_a_diverged_movement_in_a_batch_is_the_one_that_is_named() -> None:
     fragile, still, moving = unstable(), np.full(25, 0.5), movements(1)[0]

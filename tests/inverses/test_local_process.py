@@ -177,6 +177,18 @@ def test_stated_noise_is_averaged_out() -> None:
     assert process < 0.4 * nearest
 
 
+def test_an_answer_says_what_it_expects_and_how_far_off_that_is() -> None:
+    toy, rng = two_elbows(), stream(0, "told")
+    given = played(toy, 200, noise=0.05)
+    given = remembering(given.memory.thetas, rng.normal(given.memory.outcomes, 0.05), noise=0.05)
+    inverse, goals = LocalProcess(given), played(toy, 100, seed=1).memory.outcomes
+    answers = [inverse(NO_CONTEXT, goal) for goal in goals]
+    found = rng.normal(toy.effect(np.zeros((100, 0)), np.stack([each.theta for each in answers])), 0.05)
+    scaled = [(outcome - each.expected) / each.sd for outcome, each in zip(found, answers, strict=True)]
+    assert np.square(scaled).mean() == pytest.approx(1, abs=0.3)  # four sd of the mean of 200 squares
+    assert min(each.sd for each in answers if each.sd is not None) > 0.04
+
+
 def test_units_do_not_matter() -> None:
     toy = two_elbows()
     given, goals = played(toy, 120, noise=0.01), played(toy, 5, seed=1).memory.outcomes

@@ -16,6 +16,14 @@ from sgimd_torch.memory.neighbours import Table, TreeNeighbours
 side = TreeNeighbours(Table(1)); side.keys.append(np.arange(5.0)[:, None])
 print(*side.nearest(np.array([3.2]), 2))
 """
+LIFE = """
+from sgimd_torch import practice, run
+from sgimd_torch.environments.toys import two_elbows
+robot = two_elbows()
+learner = practice(robot, 1000)
+for _ in run(learner, robot, 1000, movements=300): pass
+print(hash(learner.memory.thetas.tobytes()))
+"""
 SAID = "compiling once, about 15 s\n"
 
 
@@ -28,10 +36,10 @@ def package(tmp_path: Path) -> Path:
     return copied
 
 
-def started(package: Path, **variables: str) -> subprocess.Popen[str]:
+def started(package: Path, program: str = PROGRAM, **variables: str) -> subprocess.Popen[str]:
     kept = {name: value for name, value in os.environ.items() if not name.startswith(("NUMBA", "XDG"))}
     return subprocess.Popen(
-        [sys.executable, "-B", "-c", PROGRAM],
+        [sys.executable, "-B", "-c", program],
         cwd=package.parent,
         env={**kept, "PYTHONPATH": "", **variables},
         stdout=subprocess.PIPE,
@@ -57,3 +65,11 @@ def test_where_nothing_can_be_written_it_compiles_for_this_process_alone(package
     (tmp_path / "file").touch()
     nowhere = {"HOME": str(tmp_path / "file"), "XDG_CACHE_HOME": str(tmp_path / "file")}
     assert started(package, **nowhere).communicate() == ("3 4\n", SAID)
+
+
+@pytest.mark.slow
+def test_a_life_that_begins_with_compiling_is_the_same_to_the_last_bit(package, tmp_path):
+    variables = {"NUMBA_CACHE_DIR": str(tmp_path / "mine"), "PYTHONHASHSEED": "0"}
+    lives = [started(package, LIFE, **variables).communicate() for _ in range(2)]
+    assert [said for _, said in lives] == [SAID, ""]
+    assert lives[0][0] == lives[1][0]

@@ -15,8 +15,10 @@ from sgimd_torch.catalogue import WORDS
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
 from sgimd_torch.runs import evaluations
 from sgimd_torch.runs.build import build
+from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.process import Progress, Stopped, Stopping
 from sgimd_torch.runs.read import config_of, read_run
+from sgimd_torch.runs.run import Life
 from sgimd_torch.spaces import Demonstration
 
 
@@ -203,6 +205,24 @@ def test_small_matrices_get_one_thread_unless_the_user_chose(chosen, threads):
         [sys.executable, "-c", program, "--version"], env=others | chosen, capture_output=True, text=True, check=True
     ).stdout
     assert said.split()[-1] == threads
+
+
+def test_the_time_of_evaluations_to_come_counts_their_movements(tmp_path):
+    evaluated = {"movements": 40, "evaluate_at": (10, 20), "evaluated_by": ("own",), "repeats": 3}
+    parts = build(
+        Config.from_settings({"algorithm": "random", "environment": "planar-arm-7", "out": tmp_path} | evaluated)
+    )
+    n = len(parts.benchmark.goals)
+    with Life(parts, resume=False) as life:
+        episodes = life.episodes()
+        for movements, spent, later in (
+            (9, {"physics": 18.0}, 2.0 * 6 * n),
+            (10, {"evaluation": 0.5 * n}, 0.5 * 5 * n),
+        ):
+            while life.movements < movements:
+                next(episodes)
+            life.seconds._spent.update(spent)
+            assert life._later == pytest.approx(later)  # one movement for each goal, and at the end three more
 
 
 def test_the_time_that_is_left_counts_evaluations(monkeypatch, capsys):

@@ -84,6 +84,41 @@ def test_about_as_many_goals_as_wanted_are_made_also_where_little_of_a_large_spa
 
 
 @pytest.mark.parametrize(
+    ("movements", "spread", "tiles", "limit"),
+    [
+        (4000, 1.0, 20, "no tiles are larger than 0.2"),
+        (4000, 0.15, 200, "no tiles are smaller than 0.05"),  # what is reached has room for 49 of them
+        (60, 1.0, 358, "tiles smaller than "),  # of 60 movements, hardly two land on one tile
+        (4000, 1.0, 200, ""),
+    ],
+)
+def test_what_limits_the_number_of_goals_is_said(own, module, capsys, movements, spread, tiles, limit):
+    module("spread", SPREAD.format(spread=spread))
+    run("--environment", "spread:Spread", movements=movements)
+    capsys.readouterr()
+    made = goals_of("runs", "--tiles", tiles)
+    said = capsys.readouterr().err
+    assert (f"{tiles} goals were requested, and {len(made.goals)} made: {limit}" in said) == bool(limit)
+    assert bool(said) == bool(limit)
+
+
+SPREAD = """
+import numpy as np
+from sgimd_torch import Box
+
+class Spread:
+    contexts, policies, outcomes = Box.cube(0, 1, 0), Box.cube(0, 1, 2), Box.cube(-1, 1, 2)
+    rest, outcome_noise = np.zeros(2), 0.0
+
+    def observe(self, rng):
+        return np.zeros(0)
+
+    def execute(self, context, theta, rng):
+        return {spread} * (2 * theta - 1)
+"""
+
+
+@pytest.mark.parametrize(
     ("options", "message"),
     [
         ("nowhere --out g.npz", "nowhere does not exist; runs are in OUT/NAME/seed-000"),
@@ -108,11 +143,13 @@ def test_what_cannot_be_made_is_refused_in_a_line_and_nothing_is_written(own, ca
     assert sorted(path for path in own.rglob("*") if "__pycache__" not in str(path)) == before
 
 
-def test_a_unit_with_escape_codes_does_not_reach_the_terminal(own, capsys):
+def test_a_unit_with_escape_codes_is_refused_and_does_not_reach_the_terminal(own, capsys):
     run("--environment", "sliders:Slider2")
     found = read_run("runs/random/seed-000")
     spaces = {name: [box.low.tolist(), box.high.tolist(), box.names, "\x1b[31m"] for name, box in found.spaces.items()}
     settle(Path("runs/random/seed-000"), spaces=spaces)
     capsys.readouterr()
-    goals_of("runs", "--tiles", 20)
-    assert "\x1b" not in capsys.readouterr().out
+    assert command(main, ["runs", "--out", "goals.npz"]) == 2
+    said = capsys.readouterr()
+    assert "\x1b" not in said.out + said.err
+    assert "without control characters" in said.err

@@ -189,7 +189,7 @@ def test_a_forward_model_learns_again_what_it_learnt_in_the_run(tmp_path, go):
     ("options", "message"),
     [
         ("--goals 0.3,0.6 1,2,3", "--goals must have shape"),
-        ("--goals -0.3,far", "--goals: invalid numbers value: ' -0.3,far'"),
+        ("--goals -0.3,far", "--goals: must be numbers with commas, got '-0.3,far'"),
         ("--goals 0.3,0.6 -30,60", "outside"),
         ("--after 20 41", "--after must be from 1 to 40"),
         ("--out film.avi", "--out must be a .mp4 or .webp file"),

@@ -120,9 +120,10 @@ def test_the_numbers_of_a_run_are_those_of_its_evaluations(pages, run):
     assert f"lands {mean:.3f} m from a goal after 60 movements" in pages["one"]
     assert "60 of 60 movements on fishing-rod" in pages["one"]
     errors = dict(zip(*rows_of(pages["one"], "Errors"), strict=True))
-    assert errors["last error (m)"] == f"{mean:.3f}"
-    assert errors["noise floor"] == f"{floor:.3f}"
-    assert errors["physics (s)"] == f"{run.summary['seconds_physics']:.1f}"
+    assert errors["error (m)"] == f"{mean:.3f}"
+    assert errors["median (m)"] == f"{run.at(60, 'median_error'):.3f}"
+    assert errors["noise floor (m)"] == f"{floor:.3f}"
+    assert errors["physics (ms)"] == f"{1000 * run.summary['seconds_physics'] / 60:.2f}"
 
 
 def test_the_numbers_of_a_variant_are_interquartile_means_over_its_seeds(pages, runs):
@@ -130,7 +131,7 @@ def test_the_numbers_of_a_variant_are_interquartile_means_over_its_seeds(pages, 
     errors = np.array([each.at(60) for each in seeds])
     row = next(row for row in rows_of(pages["many"], "Errors") if row[0] == "SGIM-D")
     assert row[1:3] == ["2", "60"]
-    assert row[4] == f"{interquartile_mean(errors):.3f}"
+    assert row[3] == f"{interquartile_mean(errors):.3f}"
 
 
 def test_a_run_that_has_hardly_begun_is_reported_and_one_that_was_never_evaluated_comes_last(run, tmp_path):
@@ -146,9 +147,38 @@ def test_a_run_that_has_hardly_begun_is_reported_and_one_that_was_never_evaluate
     )
     made = page(tmp_path, [Variant("new", [begun])])
     assert "0 of 60 movements" in made
-    assert "no run has been evaluated" in made
+    assert "No run has been evaluated" in made
     assert f"1 run not finished, stopped or still running: {run.path}: 0 of 60 movements" in made
     assert "lands" in page(tmp_path, [Variant("sgim-d", [run]), Variant("new", [begun])])
+
+
+def test_a_run_without_evaluations_is_judged_by_its_own_goals(run, tmp_path):
+    goals = np.repeat([[0.0, 0.5], [0.5, 0.0], [0.0, 0.0]], 2, axis=0)  # the nearer of two movements at each counts
+    outcomes = goals + np.stack([[0.3, 0.01, 0.2, 0.1, 0.4, np.nan], np.zeros(6)], axis=1)
+    alone = replace(
+        run,
+        **{name: getattr(run, name)[:6] for name in ("index", "contexts")},
+        goals=goals,
+        outcomes=outcomes,
+        origin=np.array(["local"] * 6),
+        failed=np.arange(6) == 5,
+        demonstration=np.full(6, -1),
+        answers={"own": {name: column[:0] for name, column in run.answers["own"].items()}},
+        regions=None,
+        tolerance=0.02,
+        summary={**run.summary, "movements": 6, "failed": 1},
+    )
+    variant = Variant("sgim-d", [alone])
+    assert variant.own.movements.tolist() == list(range(7))
+    assert variant.own.missed[0, 1:] == pytest.approx([0.01, 0.01, 0.055, 0.055, 0.1, 0.1])
+    assert variant.own.met[0, 1:] == pytest.approx([1, 1, 1 / 2, 1 / 2, 1 / 3, 1 / 3])
+    assert variant.own.failed[0, 1:] == pytest.approx([0] * 5 + [1 / 6])
+    made = page(tmp_path, [variant])
+    assert "missed the last 50 goals that it chose by 0.100 m (median), and met 33% of them within 0.02 m." in made
+    assert alts(made) == ["Own goals of SGIM-D", "Landing points of SGIM-D"]
+    head, row = rows_of(made, "Own goals")
+    assert dict(zip(head, row, strict=True))["failed"] == "16.7%"
+    assert [len(ax.lines) for ax in drawn(figures.own_goals, variant).axes] == [1, 2]
 
 
 def test_errors_are_those_of_finished_runs_and_unfinished_ones_are_named(runs, run):
@@ -199,7 +229,7 @@ def test_five_seeds_have_intervals_and_a_verdict_and_four_have_points_and_a_note
         made(run, "few", [error + 0.1 for error in FIVE[:4]]),
     ]
     text = page(tmp_path, variants)
-    errors = {row[0]: row[4] for row in rows_of(text, "Errors")}
+    errors = {row[0]: row[3] for row in rows_of(text, "Errors")}
     low, high = map(float, re.search(r"\[(.*), (.*)\]", errors["SGIM-D"]).groups())
     assert min(FIVE) <= low < interquartile_mean(np.array(FIVE)) < high <= max(FIVE)
     assert errors["few"] == f"{interquartile_mean(np.array(FIVE[:4]) + 0.1):.3f}"

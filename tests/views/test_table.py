@@ -1,16 +1,21 @@
 """The table of the results of runs."""
 
+import csv
+import io
+import re
 import shutil
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from pages import rows_of as table_of
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.runs.command_line import main as live
 from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.views import variants
+from sgimd_torch.views.report import command as report
 from sgimd_torch.views.table import main
 
 SEEDS = 5
@@ -24,7 +29,7 @@ def damage(path):
     file.write_bytes(content)
 
 
-FEW = "fewer than 5 seeds, too few for an interval or a deviation: sgim-d (1)\n"
+FEW = "fewer than 5 seeds, too few for an interval: sgim-d (1)\n"
 
 
 @pytest.fixture(scope="module")
@@ -53,34 +58,102 @@ def table(*options):
     return command(main, [str(option) for option in options])
 
 
-def test_the_table_gives_mean_and_deviation_over_five_seeds_or_more_and_a_note_where_there_are_fewer(runs, capsys):
+def rows_of(said):
+    """Cells of a table by head, for each variant."""
+    head, *lines = [re.split(r"  +", line) for line in said.splitlines()]
+    return {line[0]: dict(zip(head, line, strict=True)) for line in lines}
+
+
+def test_numbers_are_interquartile_means_with_intervals_if_there_are_five_seeds_as_in_a_report(runs, capsys):
     assert table(runs, "--at", 40) == 0
     said = capsys.readouterr()
-    lines = {line.split()[0]: line for line in said.out.splitlines()}
-    errors, few = (
-        np.array([read_run(path).answers["own"]["mean_error"][-1] for path in sorted((runs / name).iterdir())])
-        for name in ("random", "sgim-d")
-    )
-    deviation = np.sqrt(((errors - errors.mean()) ** 2).sum() / (SEEDS - 1))
-    assert f"{errors.mean():.3f} ± {deviation:.3f}" in lines["random"]
-    assert lines["random"].split()[1] == "5"
-    assert lines["sgim-d"].split()[1] == "1"
-    assert f"{few.mean():.3f}" in lines["sgim-d"]
-    assert "±" not in lines["sgim-d"]
+    rows = rows_of(said.out)
+    for head, column in (("error (m)", "mean_error"), ("median (m)", "median_error")):
+        errors, few = (
+            np.array([read_run(path).answers["own"][column][-1] for path in sorted((runs / name).iterdir())])
+            for name in ("random", "sgim-d")
+        )
+        middle = np.sort(errors)[1:-1].mean()  # of five seeds, the best and the worst are left out
+        low, high = map(float, re.fullmatch(rf"{middle:.3f} \[(.*), (.*)\]", rows["random"][head]).groups())
+        assert errors.min() - 5e-4 <= low <= middle <= high <= errors.max() + 5e-4
+        assert rows["sgim-d"][head] == f"{few[0]:.3f}"
+    assert [(row["seeds"], row["movements"]) for row in rows.values()] == [("5", "40"), ("1", "40")]
     assert said.err == FEW
+    assert report.main([str(runs), "--out", str(runs / "page.html")]) == 0
+    head, *shown = table_of((runs / "page.html").read_text(), "Errors")
+    assert [dict(zip(head, row, strict=True))["error (m)"] for row in shown[::-1]] == [
+        row["error (m)"] for row in rows.values()
+    ]
+    assert head[1:] == list(rows["random"])[1:]
+
+
+def test_a_goal_missed_by_far_moves_the_mean_and_not_the_median(runs, monkeypatch, capsys):
+    read_whole = variants.read_run
+
+    def read(path):
+        run = read_whole(path)
+        own = run.answers["own"] | {"mean_error": np.full(2, 0.41), "median_error": np.full(2, 0.05)}
+        return replace(run, answers={**run.answers, "own": own})
+
+    monkeypatch.setattr(variants, "read_run", read)
+    assert table(runs / "sgim-d", "--at", 40) == 0
+    row = rows_of(capsys.readouterr().out)["sgim-d"]
+    assert (row["error (m)"], row["median (m)"]) == ("0.410", "0.050")
+
+
+def test_csv_has_all_digits_and_columns_of_the_ends_of_intervals(runs, capsys):
+    assert table(runs, "--at", 40, "--format", "csv") == 0
+    rows = {row["variant"]: row for row in csv.DictReader(io.StringIO(capsys.readouterr().out))}
+    found = variants.Variant("random", variants.read(runs)["random"], 40).last_error
+    cells = [rows["random"][f"error (m){end}"] for end in ("", " low", " high")]
+    assert tuple(map(float, cells)) == found
+    assert rows["sgim-d"]["error (m) low"] == ""
+    assert rows["sgim-d"]["seeds"] == "1"
+
+
+def test_latex_needs_no_package_and_no_sign_of_a_name_is_a_command(copied, capsys):
+    (copied / "sgim-d").rename(copied / "a_b&50%")
+    assert table(copied, "--at", 40, "--baseline", "random", "--format", "latex") == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == r"\begin{tabular}{lrrrrrrrr}"
+    assert lines[-2:] == [r"\hline", r"\end{tabular}"]
+    (odd,) = [line for line in lines if line.startswith(r"a\_b\&50\% & 1 & 40 & ")]
+    assert odd.count(" & ") == 8
+    assert odd.endswith(r" \\")
+    ours, theirs = (
+        read_run(copied / name / "seed-000").answers["own"]["mean_error"][-1] for name in ("a_b&50%", "random")
+    )
+    assert f"{ours - theirs:+.4f}".replace("-", "$-$") in odd
+
+
+def test_runs_without_evaluations_are_judged_by_the_goals_that_the_learner_chose(tmp_path, capsys):
+    words = "--environment planar-arm-7 --movements 120 --evaluate-at []"
+    for algorithm in ("random", "practice"):
+        assert live([*words.split(), "--algorithm", algorithm, "--out", str(tmp_path)]) == 0
+    capsys.readouterr()
+    assert table(tmp_path) == 0
+    rows = rows_of(capsys.readouterr().out)
+    run = read_run(tmp_path / "practice/seed-000")
+    own = run.origin == "local"  # global exploration aims at no goal
+    missed = np.linalg.norm(run.goals - run.outcomes, axis=1)[own][-50:]  # each goal has one movement
+    found, head = rows["practice"], "miss of the last 50 own goals (m)"
+    assert found[head] == f"{np.median(missed):.3f}"
+    assert found["met"] == f"{(missed <= run.tolerance).mean():.0%}"
+    assert (found["failed"], found["movements"]) == ("0.0%", "120")
+    assert (rows["random"][head], rows["random"]["met"]) == ("-", "-")  # it chooses no goals
 
 
 def test_variants_are_compared_where_all_finished_runs_were_evaluated_the_last_time(copied, tiny, capsys):
     assert table(copied) == 0
     said = capsys.readouterr()
-    assert "at 40 (m)" in said.out
+    assert rows_of(said.out)["random"]["movements"] == "40"
     assert said.err == FEW
     options = "--algorithm random --name longer --movements 60 --repeats 0 --evaluate_at 20"
     assert live([*options.split(), "--benchmark", str(tiny), "--out", str(copied)]) == 0
     capsys.readouterr()
     assert table(copied) == 0  # after 20 and 60 the one, after 20 and 40 the others
     said = capsys.readouterr()
-    assert "at 20 (m)" in said.out
+    assert rows_of(said.out)["random"]["movements"] == "20"
     assert len(said.out.splitlines()) == 4
     error = read_run(copied / "longer/seed-000").answers["own"]["mean_error"][0]
     assert f"{error:.3f}" in next(line for line in said.out.splitlines() if line.startswith("longer"))
@@ -113,9 +186,9 @@ def test_runs_without_a_common_evaluation_need_at(copied, tiny, capsys):
     assert "never evaluated after the same number of movements; choose one with --at" in capsys.readouterr().err
 
 
-def test_runs_that_were_never_evaluated_are_said_to_be_so(tmp_path, capsys):
+def test_runs_that_were_never_evaluated_have_no_errors_to_compare(tmp_path, capsys):
     assert live(["--algorithm=random", "--movements=5", "--evaluate-at=[]", f"--out={tmp_path}"]) == 0
-    assert table(tmp_path) == 2
+    assert table(tmp_path, "--baseline", "random") == 2
     assert "no finished run was evaluated; were they made with --evaluate-at '[]'?" in capsys.readouterr().err
 
 
@@ -154,7 +227,7 @@ def test_few_seeds_are_compared_with_the_baseline_by_their_differences_alone(run
     ours, theirs = (
         read_run(runs / name / "seed-000").answers["own"]["mean_error"][-1] for name in ("sgim-d", "random")
     )
-    assert head == "minus random"
+    assert head == "minus random (m)"
     assert found == {"random": "-", "sgim-d": f"{ours - theirs:+.4f}"}  # of the only seed that both have
 
 

@@ -169,7 +169,7 @@ def parser() -> argparse.ArgumentParser:
     parser = parser_of("film", __doc__, epilog=EXAMPLES)
     parser.add_argument("run", type=Path, help="directory of a run: OUT/NAME/seed-003")
     goals = "points of T (default: six goals of the benchmark, or two if --after is given)"
-    parser.add_argument("--goals", type=numbers, nargs="+", metavar="X,Y", help=goals)
+    parser.add_argument("--goals", type="numbers", nargs="+", metavar="X,Y", help=goals)
     after = "numbers of movements after which to film all goals (default: all movements)"
     parser.add_argument("--after", type=int, nargs="+", metavar="N", help=after)
     parser.add_argument(
@@ -188,8 +188,3 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
     elif options.out.suffix not in RATES or not options.out.parent.is_dir():
         parser().error(f"--out must be a {' or '.join(RATES)} file in a folder that exists, got {options.out}")
     return options
-
-
-def numbers(text: str) -> list[float]:
-    """A goal on the command line, such as "0.3,0.6". Error messages of argparse have the name of this function."""
-    return [float(word) for word in text.split(",")]

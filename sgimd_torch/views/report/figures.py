@@ -23,6 +23,7 @@ from sgimd_torch.figures.learning import misses as draw_misses
 from sgimd_torch.figures.sections import Section, of_regions, sections
 from sgimd_torch.runs.read import Run
 from sgimd_torch.spaces import Array, Box
+from sgimd_torch.views.statistics import interquartile_mean
 from sgimd_torch.views.variants import Variant
 
 P = ParamSpec("P")
@@ -102,6 +103,35 @@ def error_curves(figure: Figure, variants: Sequence[Variant], colours: Mapping[s
 
 
 curves = png(error_curves)
+
+
+def has_own_goals(variant: Variant) -> bool:
+    """Whether a learner chose goals of its own; one that moves at random does not."""
+    return bool(np.isfinite(variant.own.missed).any())
+
+
+@png
+def own_goals(figure: Figure, variant: Variant) -> None:
+    """Results at the learner's own goals against movements, for runs without evaluations: distance missed, and shares.
+
+    They are interquartile means over seeds, with a thin line for each seed.
+    """
+    own, colour = variant.own, COLOURS.get(variant.algorithm, "#0072b2")
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+    for ax, values, ink, dashes, label in (
+        (upper, own.missed, colour, "-", "missed"),
+        (lower, own.met, colour, "-", "goals met"),
+        (lower, own.failed, "black", "--", "movements failed"),
+    ):
+        if len(values) > 1:
+            ax.plot(own.movements, values.T, dashes, color=ink, linewidth=0.7, alpha=0.4)
+        ax.plot(own.movements, interquartile_mean(values.T), dashes, color=ink, label=label)
+    over_movements(lower, "share")
+    upper.set_ylabel(variant.space.in_unit("distance to own goals"))
+    upper.grid(alpha=0.3)
+    upper.set_ylim(bottom=0)
+    lower.set_ylim(bottom=0)
+    lower.legend(**LEGEND)
 
 
 def figure_of_curves(variants: Sequence[Variant]) -> Figure:

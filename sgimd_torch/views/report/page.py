@@ -8,12 +8,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
+from sgimd_torch.evaluation import RECENT
 from sgimd_torch.views.report import figures, provenance
+from sgimd_torch.views.results import results
 from sgimd_torch.views.statistics import LEAST_SEEDS, Interval, show
-from sgimd_torch.views.variants import EARLY, Variant, baseline_of, compare, unit_of
+from sgimd_torch.views.variants import Variant, baseline_of, compare, unit_of
 
 
 def page(place: Path, variants: Sequence[Variant], baseline: str | None = None) -> str:
@@ -32,10 +33,7 @@ def page(place: Path, variants: Sequence[Variant], baseline: str | None = None) 
     jinja = Environment(
         loader=FileSystemLoader(Path(__file__).parent), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
-    jinja.filters |= {
-        "interval": _interval,
-        "number": lambda value, digits: f"{value:.{digits}f}" if np.isfinite(value) else "–",
-    }
+    jinja.filters |= {"interval": _interval}
     html = jinja.get_template("template.html.j2").render(
         place=place,
         variants=variants,
@@ -46,7 +44,8 @@ def page(place: Path, variants: Sequence[Variant], baseline: str | None = None) 
         compared=compare(variants, reference),
         colours=figures.colours_of(variants),
         planes=figures.planes_of(variants),
-        early=EARLY,
+        results=results(variants),
+        recent=RECENT,
         least_seeds=LEAST_SEEDS,
         figures=figures,
         provenance=provenance,
