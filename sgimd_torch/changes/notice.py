@@ -26,7 +26,7 @@ _RECENT, _OVER, _DRIFT, _SUSPICIOUS = 200, 4.0, 0.12, 3.0  # surprises, times th
 _UPPER: Final = 0.8
 _FIRST, _CALM = 50, 30  # exemplars, and predictions in this regime, before anything is suspected
 _LOOKS: Final = (16, 24, 36, 54, 81, 122, 182, 273)  # movements since the suspicion at which it is tested
-_EVERY, _SLOW = 32, (64, 128)  # without a suspicion: how often, and on how many of the last movements
+_EVERY, _SLOW = 64, 128  # without a suspicion: how often, and on how many of the last movements
 _BAD: Final = 6.0  # times the variance expected: a prediction that failed
 _SURE: Final = 3.5  # T of the test
 _MOST: Final = 1.5  # largest log ratio of two errors
@@ -64,17 +64,19 @@ class Notice:
         self.problem, self.life = problem, life
         self.box, self.noise = problem.policies, problem.outcome_noise
         self.regimes: list[Regime] = []  # earlier ones, the one that was used last comes last
-        self.since, self._review = 0, 0  # _review: length of the regime at which to look back again, 0: never
+        self.since = self._compared = 0
+        self._review = 0  # length of the regime at which to look back again, 0: never
         self._calm()
-        if prior is not None and (learnt := LocalProcess(problem.over(prior)).learnt()) is not None:
-            self.regimes, self._review = [Regime(learnt, Exemplars.of(prior))], _FIRST_LOOK
+        if prior is not None:
+            self._review = _FIRST_LOOK
+            if (learnt := LocalProcess(problem.over(prior)).learnt()) is not None:
+                self.regimes = [Regime(learnt, Exemplars.of(prior))]
 
     def _calm(self) -> None:
         self._surprises: list[float] = []
         self._errors: list[float] = []
         self._cusum, self._start, self._quiet, self._looks = 0.0, -1, 0, 0
 
-    @one_thread
     def expect(self, process: LocalProcess, context: Array, theta: Array, outcome: Array) -> None:
         """Predict a movement that is not in memory yet, and compare."""
         learnt = process.learnt()
@@ -87,25 +89,25 @@ class Notice:
         error = float(squared(expected - outcome))
         self._errors.append(error)
         self._surprises = [*self._surprises[-_RECENT:], error / (len(outcome) * float(variance) + 1e-300)]
+        if len(process.memory) >= _FIRST and len(self._surprises) >= _CALM:
+            self._accumulate(len(self.life) + 1)
 
     def look(self, process: LocalProcess) -> Again | None:
         """What to begin again with; None to go on."""
-        n, present = len(self.life), len(process.memory)
+        n = len(self.life)
         if self._review and n - self.since >= self._review:
             return self._look_back(new=False)
-        if present < _FIRST or len(self._surprises) < _CALM:
-            return None
         start = self._suspected(process, n)
         learnt = process.learnt() if start >= 0 else None
         m = 0 if learnt is None else self._changed(process.memory, learnt, n - start)
         if learnt is None or not m:
             return None
-        before = Regime(learnt, Exemplars.of(process.memory, slice(present - m)))
+        before = Regime(learnt, Exemplars.of(process.memory, slice(len(process.memory) - m)))
         self.regimes, self.since = [*self.regimes, before][-_REGIMES:], n - m
         return self._look_back(new=True)
 
-    def _suspected(self, process: LocalProcess, n: int) -> int:
-        """Row from which to test now; -1: none."""
+    def _accumulate(self, n: int) -> None:
+        """Add the last surprise to the CUSUM; ``n``: number of exemplars with this one."""
         if self._start < 0:
             self._usual = _upper(self._surprises[:-1])
         self._cusum = max(0.0, self._cusum + (self._surprises[-1] > _OVER * self._usual) - _DRIFT)
@@ -115,6 +117,9 @@ class Notice:
             if self._cusum >= _SUSPICIOUS:
                 self._start, self._looks = self._quiet, 0
                 self._usual = _upper(self._surprises[: self._quiet - n] or self._surprises)
+
+    def _suspected(self, process: LocalProcess, n: int) -> int:
+        """Row from which to test now; -1: none."""
         if self._start >= 0:
             m = n - self._start
             due = sum(m >= look for look in _LOOKS)
@@ -123,19 +128,17 @@ class Notice:
                 return self._start
             if self._cusum == 0 or m > _LOOKS[-1]:
                 self._calm()
-        elif (n - self.since) % _EVERY == 0:  # slow changes: do the last ones predict each other better?
+        elif n - self._compared >= _EVERY:  # slow changes: do the last ones predict each other better?
+            self._compared = n
             return self._slow(process, n)
         return -1
 
     def _slow(self, process: LocalProcess, n: int) -> int:
-        learnt, present = process.learnt(), len(process.memory)
-        for m in _SLOW:
-            if learnt is not None and len(self._errors) >= m and present >= 4 * m:
-                last, kernel = learnt.inputs.keys.rows[-m:], learnt.kernel
-                others = among_themselves(last, process.memory.outcomes[-m:], kernel)
-                if self._better(np.array(self._errors[-m:]), others) >= _SURE:
-                    return n - m
-        return -1
+        learnt, m = process.learnt(), _SLOW
+        if learnt is None or len(self._errors) < m or len(process.memory) < 4 * m:
+            return -1
+        others = among_themselves(learnt.inputs.keys.rows[-m:], process.memory.outcomes[-m:], learnt.kernel)
+        return n - m if self._better(np.array(self._errors[-m:]), others) >= _SURE else -1
 
     @one_thread
     def _changed(self, memory: Memory, learnt: Learnt, m: int) -> int:
