@@ -95,7 +95,7 @@ class Notice:
     def look(self, process: LocalProcess) -> Again | None:
         """What to begin again with; None to go on."""
         n = len(self.life)
-        if self._review and n - self.since >= self._review:
+        if self._start < 0 and self._review and n - self.since >= self._review:
             return self._look_back(new=False)
         start = self._suspected(process, n)
         learnt = process.learnt() if start >= 0 else None
@@ -196,8 +196,9 @@ class Notice:
                 together, _ = self._process(kept.and_then(now), chosen).left_out(len(kept.thetas) + test)
                 if self._gains(alone, together).mean() < 0:
                     kept = nothing
-        self._review = _GROWS * n if len(kept.thetas) else 0
-        self._calm()
+        self._review, self._errors = _GROWS * n if len(kept.thetas) else 0, []
+        if new:
+            self._calm()
         return Again(kept.and_then(now), len(kept.thetas), before, new)
 
     def _process(self, exemplars: Exemplars, regime: Regime) -> Regime:

@@ -53,8 +53,7 @@ class Config:
         floor_at: evaluations that measure noise; null: the last; []: none.
         benchmark: file of goals for evaluations; null: the environment's own.
         demonstrations: file of recorded demonstrations; null: the environment's own.
-        begin_with: file with movements of another robot, such as a simulator, which help as far as they hold here: the
-            run.sqlite of its run, or csv with columns context_0, theta_0, outcome_0 and so on; null: none.
+        begin_with: run.sqlite or csv of another robot or simulator to begin with; null: none.
         failures: number of failed movements in a row that stops the run; null: 10.
         at_once: number of robots that move at once; after each 30 movements one more robot joins.
         parts: parts and their options by name, such as "goals" or "goals.window"; defaults may be left out.
