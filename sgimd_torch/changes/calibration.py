@@ -2,7 +2,7 @@
 
 A movement theta of now is h(theta) = middle + a (theta - middle) + b of before, for each parameter, and its outcome y
 is seen as g(y) = y + G (1, y). So an offset, a gain or a parameter that is stuck are learnt from a few movements.
-    calibration = Calibration(regime, policies); calibration.fit(exemplars); calibration.predict(contexts, thetas)
+    calibration = Calibration(regime, policies); calibration.fit(told); errors = calibration.errors(others)
 """
 
 from __future__ import annotations
@@ -37,29 +37,25 @@ class Calibration:
         self.precision = np.repeat(_PRIOR, (self.dim, self.dim, self.out * (1 + self.out))) ** -2.0
         self.p = np.zeros(len(self.precision))
 
-    def predict(self, contexts: Array, thetas: Array) -> Array:
+    def predict(self, asked: Exemplars) -> Array:
         """Outcomes ``(n, outcome_dim)`` that movements of now should have."""
-        return self._g(self.regime.predict(contexts, self._h(thetas, self.p))[0], self.p)
+        return self._slopes(asked, self.p)[0]
 
     def fit(self, told: Exemplars) -> Calibration:
         """Fit to movements of now."""
-        p, damping = self.p, _DAMPING
-        now = self._slopes(told, p)
+        p, damping, now = self.p, _DAMPING, self._slopes(told, self.p)
         for _ in range(_STEPS):
             predicted, variances, slopes = now
             errors = squared(told.outcomes - predicted)
             usual = np.median(errors) + np.maximum(variances, 1e-300)
             weights = 1 / (usual * (1 + errors / (4 * usual)))
-
-            def loss(predicted: Array, p: Array, weights: Array = weights) -> float:
-                return float((squared(told.outcomes - predicted) * weights).sum() + (p * p * self.precision).sum())
-
             curvature = np.einsum("nik,n,nil->kl", slopes, weights, slopes) + np.diag(self.precision)
             down = np.einsum("nik,n,ni->k", slopes, weights, told.outcomes - predicted) - p * self.precision
+            loss = errors @ weights + p * p @ self.precision
             for _ in range(_TRIES):
                 tried = p + np.linalg.solve(curvature + damping * np.diag(np.diag(curvature)), down)
                 then = self._slopes(told, tried)
-                if loss(then[0], tried) < loss(predicted, p):
+                if squared(told.outcomes - then[0]) @ weights + tried * tried @ self.precision < loss:
                     break
                 damping *= _FACTOR
             else:
@@ -71,39 +67,39 @@ class Calibration:
         self.p = p
         return self
 
-    def translated(self, most: float) -> tuple[Exemplars, Array]:
-        """Exemplars of before as they would be now, and which of them are certain: their variance is at most ``most``.
+    def translated(self, most: float) -> Exemplars:
+        """Exemplars of before as they would be now; those whose variance is above ``most`` are left out.
 
         Where h^-1 leaves Pi, or a parameter is stuck, the nearest movement in Pi takes the place of the exemplar, with
         the outcome that is predicted for it.
         """
-        contexts, thetas, outcomes = self.regime.exemplars
+        before = self.regime.exemplars
+        thetas, outcomes = before.thetas, before.outcomes
         a, b = 1 + self.p[: self.dim], self.p[self.dim : 2 * self.dim] * self.policies.sides
         free = np.abs(a) >= _STUCK
         inverse = self.middle + (thetas - self.middle - b) / np.where(free, a, 1)
-        now = self.policies.clip(np.where(free, inverse, thetas))
-        there, seen, certain = self._h(now, self.p), self._g(outcomes, self.p), np.ones(len(now), dtype=bool)
+        now = before._replace(thetas=self.policies.clip(np.where(free, inverse, thetas)))
+        there, seen, certain = self._h(now.thetas, self.p), self._g(outcomes, self.p), np.ones(len(thetas), dtype=bool)
         off = np.flatnonzero((np.abs(there - thetas) > _OFF * self.policies.sides).any(axis=1))
         some = off[:: 1 + len(off) // _MOVED]
         certain[off] = False
         if len(some):
-            found, variances, _ = self.regime.predict(contexts[some], there[some])
-            seen[some], certain[some] = self._g(found, self.p), variances * self.out <= most
-        return Exemplars(contexts, now, seen), certain
+            seen[some], variances, _ = self._slopes(now.some(some), self.p)
+            certain[some] = variances * self.out <= most
+        return now._replace(outcomes=seen).some(certain)
 
     def _h(self, thetas: Array, p: Array) -> Array:
-        moved = self.middle + (1 + p[: self.dim]) * (thetas - self.middle)
-        shifted: Array = moved + p[self.dim : 2 * self.dim] * self.policies.sides
-        return shifted
+        a, b = 1 + p[: self.dim], p[self.dim : 2 * self.dim] * self.policies.sides
+        return np.asarray(self.middle + a * (thetas - self.middle) + b)
 
     def _g(self, outcomes: Array, p: Array) -> Array:
         shift, turn = np.split(p[2 * self.dim :], [self.out])
-        seen: Array = outcomes + self.spread * shift + (outcomes - self.mean) @ turn.reshape(self.out, self.out)
-        return seen
+        seen = outcomes + self.spread * shift + (outcomes - self.mean) @ turn.reshape(self.out, self.out)
+        return np.asarray(seen)
 
     def _slopes(self, told: Exemplars, p: Array) -> tuple[Array, Array, Array]:
         """Predictions, their variances, and their slopes by the parameters ``(n, outcome_dim, len(p))``."""
-        found, variances, jacobians = self.regime.predict(told.contexts, self._h(told.thetas, p))
+        found, variances, jacobians = self.regime.predict(told._replace(thetas=self._h(told.thetas, p)))
         turn = np.eye(self.out) + p[2 * self.dim + self.out :].reshape(self.out, self.out)
         turned = np.einsum("ji,njk->nik", turn, jacobians)
         slopes = np.zeros((len(found), self.out, len(p)))
@@ -119,6 +115,6 @@ def by_halves(regime: Regime, policies: Box, told: Exemplars) -> Array:
     """Squared errors ``(n,)`` of predicting movements by a regime that is calibrated by the other half of them."""
     found, half = np.empty(len(told.thetas)), np.arange(len(told.thetas)) % 2 == 0
     for test in (half, ~half):
-        fitted, tested = Calibration(regime, policies).fit(told.of_rows(~test)), told.of_rows(test)
-        found[test] = squared(fitted.predict(tested.contexts, tested.thetas) - tested.outcomes)
+        fitted, tested = Calibration(regime, policies).fit(told.some(~test)), told.some(test)
+        found[test] = squared(fitted.predict(tested) - tested.outcomes)
     return found

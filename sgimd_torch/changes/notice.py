@@ -11,17 +11,15 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sgimd_torch.changes.calibration import Calibration, by_halves
-from sgimd_torch.changes.regimes import Exemplars, Regime, among_themselves, left_out, predicted, squared
+from sgimd_torch.changes.regimes import NEAR, Exemplars, Regime, predicted, squared
 from sgimd_torch.inverses.gaussian_process import one_thread
-from sgimd_torch.inverses.local_process import Learnt, LocalProcess
+from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.memory import Memory, Rows
 from sgimd_torch.parts import Problem
 from sgimd_torch.spaces import Array
 
-_PREDICTED_FROM: Final = 60  # exemplars from which each new movement is predicted
 _RECENT, _OVER, _DRIFT, _SUSPICIOUS = 200, 4.0, 0.12, 3.0  # surprises, times their upper fifth; of the CUSUM
 _UPPER: Final = 0.8
 _FIRST, _CALM = 50, 30  # exemplars, and predictions in this regime, before anything is suspected
@@ -39,8 +37,8 @@ _ALONE, _CALIBRATED = 24, 12  # least movements that predict each other by their
 
 
 class Again(NamedTuple):
-    """What to begin again with: ``kept`` exemplars of the ``before`` exemplars of an earlier regime, then those of the
-    present one; whether the present regime is ``new``."""
+    """What to begin again with: ``kept`` of the ``before`` exemplars of an earlier regime, then all of the present one;
+    whether that is ``new``."""
 
     exemplars: Exemplars
     kept: int
@@ -61,16 +59,15 @@ class Notice:
     """
 
     def __init__(self, problem: Problem, life: Memory, prior: Memory | None) -> None:
-        self.problem, self.life = problem, life
-        self.box, self.noise = problem.policies, problem.outcome_noise
-        self.regimes: list[Regime] = []  # earlier ones, the one that was used last comes last
+        self.problem, self.life, self.noise = problem, life, problem.outcome_noise
         self.since = self._compared = 0
+        self._regimes: list[Regime] = []  # earlier ones, the one that was used last comes last
         self._review = 0  # length of the regime at which to look back again, 0: never
         self._calm()
         if prior is not None:
             self._review = _FIRST_LOOK
             if (learnt := LocalProcess(problem.over(prior)).learnt()) is not None:
-                self.regimes = [Regime(learnt, Exemplars.of(prior))]
+                self._regimes = [Regime(learnt, Exemplars.of(prior))]
 
     def _calm(self) -> None:
         self._surprises: list[float] = []
@@ -83,12 +80,11 @@ class Notice:
         if learnt is None:
             return
         here = ((np.concatenate((theta, context)) - learnt.units[0]) / learnt.units[1])[None]
-        near = learnt.inputs.nearest(here, _PREDICTED_FROM)
-        outcomes = process.memory.outcomes
-        (expected,), (variance,), _ = predicted(learnt.inputs, outcomes, near, here, learnt.kernel)
-        error = float(squared(expected - outcome))
-        self._errors.append(error)
-        self._surprises = [*self._surprises[-_RECENT:], error / (len(outcome) * float(variance) + 1e-300)]
+        near = learnt.inputs.nearest(here, NEAR)
+        found, (variance,), _ = predicted(learnt.inputs, process.memory.outcomes, near, here, learnt.kernel)
+        self._errors.append(float(squared(found[0] - outcome)))
+        surprise = self._errors[-1] / (len(outcome) * float(variance) + 1e-300)
+        self._surprises = [*self._surprises[-_RECENT:], surprise]
         if len(process.memory) >= _FIRST and len(self._surprises) >= _CALM:
             self._accumulate(len(self.life) + 1)
 
@@ -97,14 +93,13 @@ class Notice:
         n = len(self.life)
         if self._start < 0 and self._review and n - self.since >= self._review:
             return self._look_back(new=False)
-        start = self._suspected(process, n)
-        learnt = process.learnt() if start >= 0 else None
-        m = 0 if learnt is None else self._changed(process.memory, learnt, n - start)
-        if learnt is None or not m:
-            return None
-        before = Regime(learnt, Exemplars.of(process.memory, slice(len(process.memory) - m)))
-        self.regimes, self.since = [*self.regimes, before][-_REGIMES:], n - m
-        return self._look_back(new=True)
+        m = self._suspected(process, n)
+        if m and (m := self._changed(process, m)):
+            learnt, before = process.learnt(), Exemplars.of(process.memory, slice(len(process.memory) - m))
+            assert learnt is not None
+            self._regimes, self.since = [*self._regimes, Regime(learnt, before)][-_REGIMES:], n - m
+            return self._look_back(new=True)
+        return None
 
     def _accumulate(self, n: int) -> None:
         """Add the last surprise to the CUSUM; ``n``: number of exemplars with this one."""
@@ -119,47 +114,48 @@ class Notice:
                 self._usual = _upper(self._surprises[: self._quiet - n] or self._surprises)
 
     def _suspected(self, process: LocalProcess, n: int) -> int:
-        """Row from which to test now; -1: none."""
-        if self._start >= 0:
-            m = n - self._start
-            due = sum(m >= look for look in _LOOKS)
-            if due > self._looks:
-                self._looks = due
-                return self._start
-            if self._cusum == 0 or m > _LOOKS[-1]:
-                self._calm()
-        elif n - self._compared >= _EVERY:  # slow changes: do the last ones predict each other better?
-            self._compared = n
-            return self._slow(process, n)
-        return -1
+        """How many of the last movements to test now."""
+        if self._start < 0:
+            return self._drifted(process, n)
+        m = n - self._start
+        due = sum(m >= look for look in _LOOKS)
+        if due > self._looks:
+            self._looks = due
+            return m
+        if self._cusum == 0 or m > _LOOKS[-1]:
+            self._calm()
+        return 0
 
-    def _slow(self, process: LocalProcess, n: int) -> int:
-        learnt, m = process.learnt(), _SLOW
-        if learnt is None or len(self._errors) < m or len(process.memory) < 4 * m:
-            return -1
-        others = among_themselves(learnt.inputs.keys.rows[-m:], process.memory.outcomes[-m:], learnt.kernel)
-        return n - m if self._better(np.array(self._errors[-m:]), others) >= _SURE else -1
+    def _drifted(self, process: LocalProcess, n: int) -> int:
+        """Without a suspicion, how many of the last movements predict each other better than they were predicted."""
+        m, learnt = _SLOW, process.learnt()
+        if n - self._compared < _EVERY or learnt is None:
+            return 0
+        self._compared = n
+        if len(self._errors) < m or len(process.memory) < 4 * m:
+            return 0
+        others, _ = Regime(learnt, Exemplars.of(process.memory, slice(-m, None))).left_out(np.arange(m))
+        return m if self._better(np.array(self._errors[-m:]), others) >= _SURE else 0
 
     @one_thread
-    def _changed(self, memory: Memory, learnt: Learnt, m: int) -> int:
-        """How many of the last ``m`` movements are of another regime, 0 for none."""
-        n = len(memory)
-        if n - m < _CALM:
+    def _changed(self, process: LocalProcess, m: int) -> int:
+        """How many of the last ``m`` movements are of another regime."""
+        learnt, memory, n = process.learnt(), process.memory, len(process.memory)
+        if learnt is None or n - m < _CALM:
             return 0
         rows = np.arange(max(n - m, n - _TESTED), n)
         told, before = Exemplars.of(memory, rows), Regime(learnt, Exemplars.of(memory, slice(n - m)))
-        expected, variances, _ = before.predict(told.contexts, told.thetas)
-        as_it_was = squared(expected - told.outcomes)
-        failed = as_it_was > _BAD * variances * expected.shape[1]
+        as_it_was, failed = before.errors(told), before.predict(told)[1] * _BAD * memory.outcome_dim
         # If nothing had changed, both would predict; the first errs more where noise has grown.
-        nulls = left_out(learnt.inputs, memory.outcomes, rows, learnt.kernel)[0], as_it_was
-        inputs = before.in_lengths(told.contexts, told.thetas)
-        others = among_themselves(inputs, told.outcomes, learnt.kernel), by_halves(before, self.box, told)
-        for other in others:
-            for which in (slice(None), failed):  # a local change is seen in those that failed
+        nulls = Regime(learnt, Exemplars.of(memory)).left_out(rows)[0], as_it_was
+        alone, _ = Regime(learnt, told).left_out(np.arange(len(rows)))
+        for other in (alone, by_halves(before, self.problem.policies, told)):
+            for which in (slice(None), as_it_was > failed):  # a local change is seen in those that failed
                 if all(self._better(null[which], other[which]) >= _SURE for null in nulls):
                     # The suspicion may have begun too early: the first movements then fit the old regime better.
-                    last = 1 + int(self._gains(as_it_was, other)[::-1].cumsum().argmax())
+                    gains = np.zeros(len(rows))
+                    gains[which] = self._gains(as_it_was, other)[which]
+                    last = 1 + int(gains[::-1].cumsum().argmax())
                     return m if last == len(rows) else last
         return 0
 
@@ -177,25 +173,21 @@ class Notice:
     def _look_back(self, *, new: bool) -> Again:
         """Exemplars of earlier regimes that help to predict this one, then all of this one."""
         now = Exemplars.of(self.life, slice(self.since, None))
-        n, nothing = len(now.thetas), now.of_rows(slice(0))
+        n, kept, before, best = len(now.thetas), now.some(slice(0)), 0, -np.inf
         test = np.arange(max(0, n - _TESTED), n)
-        told = now.of_rows(test)
-        best, kept, before = -np.inf, nothing, 0
-        for regime in self.regimes:
+        told = now.some(test)
+        for regime in self._regimes:
             mine, _ = self._process(now, regime).left_out(test)
-            errors = [squared(regime.predict(told.contexts, told.thetas)[0] - told.outcomes)]
-            errors += [by_halves(regime, self.box, told)] if n >= _CALIBRATED else []
+            errors = [regime.errors(told)]
+            errors += [by_halves(regime, self.problem.policies, told)] if n >= _CALIBRATED else []
             for change, each in enumerate(errors):
-                gain = float(self._gains(mine, each).mean())
-                if gain > best:
+                if (gain := float(self._gains(mine, each).mean())) > best:
                     best, chosen, calibrated, alone = gain, regime, bool(change), mine
-        if self.regimes:
-            self.regimes = [*(each for each in self.regimes if each is not chosen), chosen]
-            kept, before = self._helpful(chosen, calibrated, now, test), len(chosen.exemplars.thetas)
-            if len(kept.thetas):
-                together, _ = self._process(kept.and_then(now), chosen).left_out(len(kept.thetas) + test)
-                if self._gains(alone, together).mean() < 0:
-                    kept = nothing
+        if self._regimes:
+            self._regimes = [*(each for each in self._regimes if each is not chosen), chosen]
+            helpful, before = self._helpful(chosen, calibrated, now, test), len(chosen.exemplars.thetas)
+            together, _ = self._process(helpful.and_then(now), chosen).left_out(len(helpful.thetas) + test)
+            kept = helpful if self._gains(alone, together).mean() >= 0 else kept
         self._review, self._errors = _GROWS * n if len(kept.thetas) else 0, []
         if new:
             self._calm()
@@ -212,17 +204,16 @@ class Notice:
 
         What a calibration leaves unexplained is a process, too.
         """
-        calibration = Calibration(regime, self.box)
+        calibration = Calibration(regime, self.problem.policies)
         if calibrated:
-            calibration.fit(now.of_rows(test))
-        left = now._replace(outcomes=now.outcomes - calibration.predict(now.contexts, now.thetas))
-        before, certain = calibration.translated(max(float(np.median(squared(left.outcomes[test]))), self.noise**2))
+            calibration.fit(now.some(test))
+        left = now._replace(outcomes=now.outcomes - calibration.predict(now))
+        before = calibration.translated(max(float(np.median(squared(left.outcomes[test]))), self.noise**2))
         of_left, alone = self._process(left, regime), self._process(now, regime)
-        wrong, variances, _ = of_left.predict(before.contexts, before.thetas)
-        _, without, _ = alone.predict(before.contexts, before.thetas)
-        ok: NDArray[np.bool_] = variances * of_left.doubt(test) < _SURER * without * alone.doubt(test)
-        before = before._replace(outcomes=before.outcomes + wrong)
-        return before.of_rows(np.logical_and(ok, certain))
+        wrong, variances, _ = of_left.predict(before)
+        without = alone.predict(before)[1] * alone.doubt(test)
+        corrected = before._replace(outcomes=before.outcomes + wrong)
+        return corrected.some(variances * of_left.doubt(test) < _SURER * without)
 
 
 def _upper(values: list[float]) -> float:

@@ -203,5 +203,5 @@ def test_a_calibration_finds_offset_and_gain():
     now = Exemplars.of(memory, slice(100, 140))
     now = now._replace(thetas=0.5 + (now.thetas - 0.5 - 0.04) / 0.9)  # movements of now that do what those did before
     found = Calibration(regime, ARM.policies).fit(now)
-    assert np.abs(found.predict(now.contexts, now.thetas) - now.outcomes).max() < 0.02
+    assert np.abs(found.predict(now) - now.outcomes).max() < 0.02
     assert found.p[:6] == pytest.approx([-0.1] * 3 + [0.04] * 3, abs=0.02)
