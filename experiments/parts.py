@@ -17,7 +17,7 @@ from sgimd_torch.environments.toys import toss
 from sgimd_torch.learner import Learner
 from sgimd_torch.rivals import quality_diversity
 from sgimd_torch.runs.tasks import Task
-from sgimd_torch.runs.tasks.robots import toy_benchmark
+from sgimd_torch.runs.tasks.toys import toy_benchmark
 from sgimd_torch.spaces import Array, Box
 
 

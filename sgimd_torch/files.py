@@ -118,8 +118,10 @@ def read_npz(path: str | os.PathLike[str], kind: str, writer: str, names: Sequen
         file.seek(0)
         try:
             with zipfile.ZipFile(file) as stored:
-                known = set(stored.namelist())
-                found = {name: _array(stored, f"{name}.npy") for name in names if f"{name}.npy" in known}
+                known = {info.filename: info for info in stored.infolist()}
+                wanted = {name: known[f"{name}.npy"] for name in names if f"{name}.npy" in known}
+                check_density(sum(info.file_size for info in wanted.values()), path)
+                found = {name: _array(stored, info) for name, info in wanted.items()}
             for array in found.values():
                 array.flags.writeable = False
         except _UNREADABLE as error:  # numpy's own message advises allow_pickle=True, which is unsafe
@@ -129,15 +131,13 @@ def read_npz(path: str | os.PathLike[str], kind: str, writer: str, names: Sequen
     return [found[name] for name in names]
 
 
-def _array(stored: zipfile.ZipFile, name: str) -> Stored:
-    """An array of an npz file. Its size is looked at before any memory is taken."""
-    info = stored.getinfo(name)
-    check_density(info.file_size, str(stored.filename))
+def _array(stored: zipfile.ZipFile, info: zipfile.ZipInfo) -> Stored:
+    """An array of an npz file, if it is as long as its header says."""
     with stored.open(info) as member:
         head = np.lib.format.read_array_header_1_0 if np.lib.format.read_magic(member) == (1, 0) else None
         shape, _, kind = (head or np.lib.format.read_array_header_2_0)(member)
         if math.prod(shape) * kind.itemsize != info.file_size - member.tell():
-            raise ValueError(f"{name} has not as many numbers as it says")
+            raise ValueError(f"{info.filename} has not as many numbers as it says")
     with stored.open(info) as member:
         return np.asarray(np.lib.format.read_array(member, allow_pickle=False))
 

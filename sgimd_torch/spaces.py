@@ -368,6 +368,12 @@ def _own(new: Move | Demonstration | Request | Episode, *names: str) -> None:
             object.__setattr__(new, name, read_only(value))
 
 
+def rounded(length: float) -> float:
+    """The least 1, 2 or 5 times a power of ten that is not below ``length``."""
+    power = 10.0 ** np.floor(np.log10(length))
+    return float(power * next(k for k in (1, 2, 5, 10) if power * k >= length))
+
+
 def read_only(value: ArrayLike) -> Array:
     """A copy that cannot be written into."""
     array = np.array(value)

@@ -1,5 +1,6 @@
 """A tiny benchmark, a short run on it, and what that run records when nothing disturbs it."""
 
+import os
 import sys
 
 import numpy as np
@@ -10,6 +11,9 @@ from runs import arguments, content_of
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.process import command
+
+# MuJoCo is imported without OpenGL, as a display may be missing; pictures in space are made in processes of their own.
+os.environ.setdefault("MUJOCO_GL", "disable")
 
 
 @pytest.fixture(scope="session")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sgimd_torch.inverses.jit import LISTS, NUMBERS, TABLE, called, columns
 from sgimd_torch.inverses.kernels import covariances, expected, fitted, unknown
+from sgimd_torch.memory.jit import LISTS, NUMBERS, TABLE, called, columns
 from sgimd_torch.spaces import Array
 
 

@@ -139,6 +139,8 @@ def _values(table: Table, names: Sequence[str], rows: slice) -> tuple[Array, lis
         vectors = values.reshape(len(values), -1)
         plain = [name] if values.ndim == 1 else [f"{name}[{k}]" for k in range(vectors.shape[1])]
         called = table.entries.get(name) or plain
+        if len(called) != len(plain):
+            raise ValueError(f"{name} has {len(plain)} entries, but names of {len(called)}: {', '.join(called)}")
         first, end = int(match["first"] or 0), vectors.shape[1]
         if match["first"] is not None:
             end = first + 1 if match["slice"] is None else int(match["end"] or end)

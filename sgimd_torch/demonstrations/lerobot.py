@@ -30,6 +30,7 @@ except ImportError as error:
     raise ImportError(f"a LeRobot dataset needs pyarrow: pip install 'sgimd-torch[lerobot]' ({error})") from error
 
 STATE: Final = "observation.state"
+_NUMBERS: Final = ("INT32", "INT64", "FLOAT", "DOUBLE")  # parquet's names of types
 _OF_ITS_RANGE: Final = ("so100", "so101", "koch", "lekiwi")  # robots that record shares of the ranges of joints
 
 
@@ -96,6 +97,8 @@ def _found(name: str, entries: dict[str, list[str]]) -> str:
     homes = {feature: f"{feature}[{names.index(name)}]" for feature, names in entries.items() if name in names}
     if name in entries or not homes:
         return name
+    if any(entries[feature].count(name) > 1 for feature in homes):
+        raise ValueError(f"a feature has two entries {name}; write {' or '.join(homes)} with a number, such as [0]")
     if STATE not in homes and len(homes) > 1:
         raise ValueError(f"{name} is an entry of several features; write {' or '.join(homes.values())}")
     return homes.get(STATE, next(iter(homes.values())))
@@ -127,8 +130,8 @@ def _columns(file: Path, names: list[str]) -> dict[str, np.ndarray]:
         wanted = tuple(f"{name}." for name in names)
         read = [chunk for chunk in chunks if f"{chunk.path_in_schema}.".startswith(wanted)]
         for chunk in read:
-            if chunk.physical_type.endswith("BYTE_ARRAY"):  # few bytes may stand for any number of long texts
-                raise ValueError(f"{chunk.path_in_schema} has no numbers")
+            if chunk.physical_type not in _NUMBERS:  # few bytes may stand for any number of long texts
+                raise ValueError(f"{chunk.path_in_schema} has {chunk.physical_type}, no numbers")
         check_density(sum(8 * chunk.num_values for chunk in read), file)
         table = pyarrow.parquet.read_table(file, columns=names, page_checksum_verification=True)
         return {name: np.array(table.column(name).to_pylist()) for name in names}

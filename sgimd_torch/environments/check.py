@@ -171,15 +171,16 @@ def _noise(environment: Environment, tried: Movements) -> Iterator[str]:
     announced, dim = float(environment.outcome_noise), environment.outcomes.dim
     pairs = [[_call(environment, "execute", *each, stream(k, "execute")).copy() for k in (1, 2)] for each in tried]
     scatter = np.sqrt([np.mean(np.square(one - other)) / 2 for one, other in pairs])
-    noisy = scatter[scatter > _rounding(environment)] if not announced else scatter[scatter > 0]
+    negligible = announced <= _rounding(environment)  # as the trembling of a thing at rest in a simulation
+    noisy = scatter[scatter > (_rounding(environment) if negligible else 0)]
     if not len(noisy):
-        if announced:
+        if not negligible:
             yield f"outcome_noise is {announced:g}, but no movement scatters; does execute() use its rng?"
         return
     # The median of a mean of ``dim`` squares of standard normal numbers is about (1 - 2 / (9 dim))^3.
     typical = float(np.median(noisy) / (1 - 2 / (9 * dim)) ** 1.5)
-    if not announced:
-        yield f"outcome_noise is 0, but outcomes of a movement scatter by about {typical:.2g}; announce this value"
+    if negligible:
+        yield f"outcome_noise is {announced:g}, but outcomes of a movement scatter by about {typical:.2g}; announce it"
     elif not announced / _FACTOR <= typical <= announced * _FACTOR:
         yield f"outcome_noise is {announced:g}, but outcomes of a movement scatter by {typical:.2g}; a wrong unit?"
     elif scatter.max() > _FACTOR * typical:

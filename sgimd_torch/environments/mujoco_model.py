@@ -63,6 +63,25 @@ class Place:
         return [f"{self.name} {_AXES[axis]}" for axis in self.axes] or [self.name]
 
 
+def file_of(model: str | Path) -> Path:
+    """The file of a model: its path, or the scene of a robot of the package mujoco-menagerie, such as menagerie:aloha.
+
+    Raises:
+        ValueError: the package is not installed, it has no such robot, or it cannot download the robot.
+    """
+    collection, _, name = str(model).partition(":")
+    if collection != "menagerie":
+        return Path(model)
+    try:
+        import mujoco_menagerie  # an optional dependency
+    except ImportError as error:
+        raise ValueError(f"{model} needs a package that is not installed: pip install mujoco-menagerie") from error
+    try:
+        return Path(mujoco_menagerie.get(name).xml())
+    except mujoco_menagerie.MenagerieError as error:
+        raise ValueError(f"model {model}: {error}") from error
+
+
 def load_model(path: Path, joints: Sequence[str]) -> tuple[mujoco.MjModel, list[str]]:
     """The model in a file, and remarks; ``joints`` of a model without actuators get position servos.
 
@@ -75,6 +94,9 @@ def load_model(path: Path, joints: Sequence[str]) -> tuple[mujoco.MjModel, list[
         spec = mujoco.MjSpec.from_file(str(path))
         for mesh in spec.meshes:
             mesh.file = _of_package(path, mesh.file)
+        for kind in (spec.bodies, spec.sites):  # a hand leads an arm by a name
+            for k, each in enumerate(kind):
+                each.name = each.name or f"unnamed_{k}"
         spec.compiler.fusestatic = False  # else links on fixed joints of a URDF, such as its tool, lose their names
         model = spec.compile()
         if model.nu:
@@ -205,17 +227,34 @@ def positions(model: mujoco.MjModel, actuators: Sequence[int]) -> tuple[str, ...
     return () if None in joints else tuple(model.joint(k).name for k in joints)
 
 
-def chain_to(model: mujoco.MjModel, place: Place, actuators: Sequence[int]) -> tuple[list[int], bool]:
-    """Bodies from the base of the robot to ``place`` if the robot carries it, else to the last one; and if it does."""
+def moved_by(model: mujoco.MjModel, actuators: Sequence[int]) -> list[int]:
+    """Bodies that a joint of one of ``actuators`` moves, from the base outwards; all if they act on no joint."""
+    found = {int(model.jnt_bodyid[joint]) for k in actuators if (joint := joint_of(model, k)) is not None}
+    for body in range(1, model.nbody):  # a parent has a lower number
+        if int(model.body_parentid[body]) in found:
+            found.add(body)
+    return sorted(found) or [*range(1, model.nbody)]
+
+
+def hand_of(model: mujoco.MjModel, place: Place, bodies: Sequence[int]) -> Place:
+    """The end of an arm of ``bodies``: ``place`` if the arm carries it, else the outermost site, else the last body."""
+    if place.kind != "joint" and body_of(model, place) in bodies:
+        return place
+    outwards = path_to(model, max(bodies, key=lambda body: len(path_to(model, body))))
+    sites = [k for body in reversed(outwards) for k in range(model.nsite) if model.site_bodyid[k] == body]
+    kind, number = ("site", sites[0]) if sites else ("body", outwards[-1])
+    return Place(kind, getattr(model, kind)(number).name, number)
+
+
+def body_of(model: mujoco.MjModel, place: Place) -> int:
+    """The body that has a place."""
     bodies = {"site": model.site_bodyid, "geom": model.geom_bodyid, "joint": model.jnt_bodyid}.get(place.kind)
-    driven = {int(model.jnt_bodyid[joint]) for k in actuators if (joint := joint_of(model, k)) is not None}
+    return place.number if bodies is None else int(bodies[place.number])
 
-    def path(body: int) -> list[int]:
-        return [*path(int(model.body_parentid[body])), body] if body else []
 
-    there = path(place.number if bodies is None else int(bodies[place.number]))
-    carried = not driven or bool(driven & {*there})
-    return there if carried else max(map(path, driven), key=len), carried
+def path_to(model: mujoco.MjModel, body: int) -> list[int]:
+    """Bodies from the base to ``body``."""
+    return [*path_to(model, int(model.body_parentid[body])), body] if body else []
 
 
 def _of_package(path: Path, file: str) -> str:

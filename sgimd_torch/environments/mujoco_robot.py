@@ -8,9 +8,10 @@ outside Python. ``mujoco_model.py`` reads the model and finds what is named in i
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import ClassVar, Final
 
 import mujoco
 import numpy as np
@@ -21,25 +22,44 @@ from sgimd_torch.catalogue import unknown
 from sgimd_torch.environments.controllers import Controller
 from sgimd_torch.environments.motor_primitives import GaussianPrimitive
 from sgimd_torch.environments.mujoco_model import (
-    chain_to,
+    body_of,
     commands_box,
     context_box,
+    file_of,
     files_of,
+    hand_of,
     holding,
     load_model,
+    moved_by,
     outcome_places,
+    path_to,
     positions,
 )
-from sgimd_torch.environments.protocol import Primitive, SimulationError, Sketch, check_movement, check_robot
-from sgimd_torch.spaces import Array, Box, check_count, check_point, check_rng, stream
+from sgimd_torch.environments.protocol import Primitive, SimulationError, check_movement, check_robot
+from sgimd_torch.environments.sketch import Sketch
+from sgimd_torch.spaces import Array, Box, check_count, check_point, check_rng, read_only, stream
 
 EXPLORED: Final = 300  # number of random movements that find T
 REPEATED: Final = 30  # number of random movements that are executed twice to find the noise of outcomes
 MOVED: Final = 1e-3  # m or rad, shift of the measured place that counts as moved
 FEWEST: Final = 10  # number of random movements that must move the measured place
+TREMBLE: Final = 1e-6  # m or rad; an object at rest trembles less, which must not look like an effect of a movement
 _BLOCK: Final = 32  # number of movements simulated in parallel
 _STATE: Final = mujoco.mjtState.mjSTATE_FULLPHYSICS
 _FRAMES: Final = 25.0  # drawings of a movement per second
+
+
+@dataclass(frozen=True, eq=False)
+class Filmed(Sketch):
+    """Drawings of a simulated movement, with the states of the simulation.
+
+    Args:
+        states: ``(n_steps, n)`` full physics states.
+        path: ``(n_steps, n_places, 3)`` m, world positions of the measured places; joints have none.
+    """
+
+    states: Array
+    path: Array
 
 
 class MujocoRobot:
@@ -49,7 +69,7 @@ class MujocoRobot:
     a robot. When a simulation diverges, MuJoCo adds a line to ``MUJOCO_LOG.TXT`` in the current directory.
 
     Args:
-        model: path of the MJCF or URDF file.
+        model: path of the MJCF or URDF file, or menagerie:NAME for a robot of the package mujoco-menagerie.
         outcome: comma-separated places at the end of a movement, such as site:tip, body:cup:xy, geom:ball:xz or
             joint:door.
         joints: joints that move; () for all with an actuator. Other actuators hold their initial positions.
@@ -57,6 +77,9 @@ class MujocoRobot:
             joint:NAME:LOW:HIGH for a hinge or slide; "" for no context.
         displacement: whether an outcome is the shift of the place from where the movement began.
         low, high: corners of T; () for T found by random movements.
+        rest: outcome of not moving; () for the outcome of a movement that holds the start.
+        outcome_noise: standard deviation of outcomes if a movement is repeated; None for what ``noise`` makes of random
+            movements, at least 1e-6.
         durations: shortest and longest duration of a movement (s).
         n_knots: number of knots of each joint.
         settle: time (s) between the end of a movement and its outcome.
@@ -68,7 +91,9 @@ class MujocoRobot:
             None for a `GaussianPrimitive`.
 
     Attributes:
+        bodies: indices of the bodies that the joints of the robot move.
         files: model file, and files that it includes.
+        found: T, ``rest`` and ``outcome_noise``, as options.
         joints: names of the joints whose positions the commands are; () if they are anything else, such as torques.
         remarks: sentences for the user, for example about T.
 
@@ -76,6 +101,8 @@ class MujocoRobot:
         ValueError: a name is not in the model, a number is out of its range, or the model cannot be used.
         OSError: there is no such file.
     """
+
+    FOUND: ClassVar = ("low", "high", "rest", "outcome_noise")
 
     def __init__(
         self,
@@ -87,6 +114,8 @@ class MujocoRobot:
         displacement: bool = False,
         low: tuple[float, ...] = (),
         high: tuple[float, ...] = (),
+        rest: tuple[float, ...] = (),
+        outcome_noise: float | None = None,
         durations: tuple[float, float] = (0.5, 1.5),
         n_knots: int = 4,
         settle: float = 0.5,
@@ -100,7 +129,7 @@ class MujocoRobot:
         for name, value in (("settle", settle), ("noise", noise)):
             if not 0 <= value < np.inf:
                 raise ValueError(f"{name} must be finite and >= 0, got {value}")
-        path = Path(model)
+        path = file_of(model)
         self.model, self.remarks = load_model(path, joints)
         self.files = files_of(path)
         commands, self._actuators, said = commands_box(self.model, joints)
@@ -112,15 +141,28 @@ class MujocoRobot:
             self.correspondence = self._controller.correspondence
         self.policies, self._sides = self._controller.policies, commands.sides
         self.joints = positions(self.model, self._actuators)
+        self.bodies = moved_by(self.model, self._actuators)
         self.contexts, self._addresses = context_box(self.model, context)
         self._places = outcome_places(self.model, outcome)
+        self._hand = hand_of(self.model, self._places[0], self.bodies)
         self._longest, self._settle, self._displacement, self.noise = durations[1], settle, displacement, noise
         threads = check_count("threads", threads, 1)
         self._pool = rollout.Rollout(nthread=threads if threads > 1 else 0)
         self._data = [mujoco.MjData(self.model) for _ in range(threads)]
         self._home, self._held = self._begin(keyframe, path.name)
-        self._find_spaces(low, high, path.name)
+        names = [name for place in self._places for name in place.names]
+        self._dim = len(names)
+        still = check_point("rest", rest, self._dim) if rest else self._still_outcome(path.name)
+        if low or high:
+            corners = [check_point(name, each, self._dim) for name, each in (("low", low), ("high", high))]
+        else:
+            corners = self._explored(still, names, path.name)
+        self.outcomes = Box(corners[0], corners[1], tuple(names), self._places[0].unit)
+        self.rest = read_only(still if rest else self.outcomes.clip(np.round(still, 3)))
+        self.outcome_noise = max(TREMBLE, self._scatter()) if outcome_noise is None else outcome_noise
         check_robot(self)
+        points = [tuple(each.tolist()) for each in (self.outcomes.low, self.outcomes.high, self.rest)]
+        self.found = dict(zip(self.FOUND, (*points, self.outcome_noise), strict=True))
 
     @property
     def start(self) -> Array:
@@ -129,10 +171,9 @@ class MujocoRobot:
 
     @property
     def hand(self) -> str:
-        """Name of the measured site or body, or of the last body of an arm that does not carry it."""
-        bodies, carried = chain_to(self.model, self._places[0], self._actuators)
-        named = carried and self._places[0].kind in ("site", "body")
-        return self._places[0].name if named else self.model.body(bodies[-1]).name
+        """Name of the body or site at the end of the arm."""
+        kind, body = self._hand.kind, body_of(self.model, self._hand)
+        return self.model.body(body).name if kind == "geom" else self._hand.name
 
     def observe(self, rng: np.random.Generator) -> Array:
         """``(context_dim,)``, uniform in C."""
@@ -161,23 +202,69 @@ class MujocoRobot:
             outcomes[rows] = [self._outcome(states) for states in self._simulate(contexts[rows], commands[rows])]
         return outcomes
 
-    def trace(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Sketch:
-        """Drawings of a movement: the bodies of the arm, in the plane of the first two dimensions of an outcome."""
+    def trace(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Filmed:
+        """The states of a movement, and drawings of the arm, of objects and of the measured places.
+
+        The drawings lie in the plane of the first two dimensions of an outcome.
+        """
         context, theta = check_movement(self, context, theta)
         (states,) = self._simulate(context[None], [self._commands(theta, rng)])
         if states is None:
             raise SimulationError(f"the simulation diverged in context {context.tolist()}", theta)
         every = max(1, round(1 / (_FRAMES * self.model.opt.timestep)))
-        place, data, outcome, chains = self._places[0], self._data[0], self._outcome(states), list[Array]()
-        bodies, carried = chain_to(self.model, place, self._actuators)
+        shown = states[::-every][::-1]  # the last drawing shows the outcome
+        drawn = [self._drawing(state, states[0]) for state in shown]
+        chains = [np.stack(each) for each in zip(*drawn, strict=True)]
+        path = np.stack([self._measured(state) for state in shown])
+        return Filmed(self._outcome(states), every * self.model.opt.timestep, chains, shown, path)
+
+    def start_in(self, context: Array) -> Array:
+        """The full physics state in which a movement begins in a context ``(context_dim,)``."""
+        start = self._home.copy()
+        start[[1 + address for address in self._addresses]] = context  # time, then all positions
+        return start
+
+    def positions(self, state: Array) -> Array:
+        """``(nq,)``, the positions of all joints in a full physics state."""
+        return self._at(state).qpos.copy()
+
+    def located(self, outcomes: Array, start: Array) -> Array:
+        """World positions ``(n, n_places, 3)`` m of ``outcomes`` ``(n, outcome_dim)``; joints have none.
+
+        A coordinate that is not measured is that at the start of the movement.
+
+        Args:
+            outcomes: outcomes, or goals.
+            start: full physics state in which the movement begins.
+        """
+        found = np.tile(self._measured(start), (len(outcomes), 1, 1))
+        row = column = 0
+        for place in self._places:
+            if place.axes:
+                found[:, row, place.axes] *= self._displacement
+                found[:, row, place.axes] += outcomes[:, column : column + len(place.axes)]
+                row += 1
+            column += len(place.names)
+        return found
+
+    def _measured(self, state: Array) -> Array:
+        """``(n_places, 3)`` m, the world positions of the measured places; joints have none."""
+        data = self._at(state)
+        return np.reshape([place.position(data) for place in self._places if place.axes], (-1, 3))
+
+    def _drawing(self, state: Array, start: Array) -> list[Array]:
+        """Chains ``(n_points, 2)`` of one drawing, in the first two dimensions of T: arm, objects, measured places."""
+        place = self._places[0]
+        if not place.axes:  # T is of joints, so the drawing is, too
+            joints = self._read(state) - self._displacement * self._read(start)
+            return [np.append(joints, 0.0)[None, :2]]
+        origin, data = self._displacement * self._measured(start)[0], self._at(state)
+        arm = [*data.xpos[path_to(self.model, body_of(self.model, self._hand))], self._hand.position(data)]
+        objects = [k for k in range(1, self.model.nbody) if self.model.body_jntnum[k] and k not in self.bodies]
+        others = [each.position(data) for each in self._places[self._hand is place :] if each.axes]
         axes = [*place.axes, *(k for k in range(3) if k not in place.axes)][:2]
-        for state in (states[0], *states[::-every][::-1]):  # the last drawing shows the outcome
-            self._read(state)
-            points = np.vstack([data.xpos[bodies], *[place.position(data)] * carried])[:, axes]
-            if not chains:
-                origin = points[-1] if self._displacement and carried else 0.0
-            chains.append(points - origin)
-        return Sketch(outcome, every * self.model.opt.timestep, np.stack(chains[1:]))
+        chains = np.stack(arm), *data.xpos[objects][:, None], *np.reshape(others, (-1, 1, 3))
+        return [(chain - origin)[:, axes] for chain in chains]
 
     def _begin(self, keyframe: str, file: str) -> tuple[Array, Array]:
         """Start configuration (a full physics state), and commands ``(nu,)`` that hold it."""
@@ -214,7 +301,7 @@ class MujocoRobot:
 
     def _simulate(self, contexts: Array, commands: Sequence[Array]) -> list[Array | None]:
         """States of each movement, the first one before its first step; None if the simulation diverged."""
-        starts = np.stack([self._start(context) for context in contexts])
+        starts = np.stack([self.start_in(context) for context in contexts])
         n_steps = [len(each) for each in commands]
         controls = np.stack([np.pad(each, ((0, max(n_steps) - len(each)), (0, 0)), "edge") for each in commands])
         run, _ = self._pool.rollout(self.model, self._data, starts, controls)
@@ -225,11 +312,6 @@ class MujocoRobot:
             found.append(np.concatenate([start[None], states[:n]]) if right else None)
         return found
 
-    def _start(self, context: Array) -> Array:
-        start = self._home.copy()
-        start[[1 + address for address in self._addresses]] = context  # time, then all positions
-        return start
-
     def _outcome(self, states: Array | None) -> Array:
         if states is None:
             return np.full(self._dim, np.nan)
@@ -237,30 +319,30 @@ class MujocoRobot:
 
     def _read(self, state: Array) -> Array:
         """``(outcome_dim,)``, the measured places in a full physics state."""
+        data = self._at(state)
+        return np.concatenate([place.read(data) for place in self._places])
+
+    def _at(self, state: Array) -> mujoco.MjData:
+        """MuJoCo's data in a full physics state, until the next call."""
         data = self._data[0]
         mujoco.mj_setState(self.model, data, state, _STATE)
         mujoco.mj_kinematics(self.model, data)
-        return np.concatenate([place.read(data) for place in self._places])
+        return data
 
-    def _find_spaces(self, low: tuple[float, ...], high: tuple[float, ...], file: str) -> None:
-        """Set T, ``rest`` and ``outcome_noise``."""
-        names = [name for place in self._places for name in place.names]
-        self._dim, unit, middle = len(names), self._places[0].unit, (self.contexts.low + self.contexts.high) / 2
+    def _still_outcome(self, file: str) -> Array:
+        """``(outcome_dim,)``, the outcome of a movement that holds the start, in the middle of C."""
+        middle = (self.contexts.low + self.contexts.high) / 2
         (still,) = self._simulate(middle[None], [self._still(self._longest)])
         if still is None:
             raise ValueError(f"{file} diverges even while it holds still; is its timestep too long?")
-        rest = self._outcome(still)
-        if low or high:
-            corners = [check_point(name, each, self._dim) for name, each in (("low", low), ("high", high))]
-        else:
-            corners = self._explored(rest, names, file)
-        self.outcomes = Box(corners[0], corners[1], tuple(names), unit)
-        self.rest = self.outcomes.clip(np.round(rest, 3))
-        self.rest.flags.writeable = False
-        self.outcome_noise = 0.0
-        if self.noise:
-            one, other = (self._tried(REPEATED, execution)[1] for execution in ("one", "other"))
-            self.outcome_noise = float(np.sqrt(np.nanmean(np.square(one - other)) / 2))
+        return self._outcome(still)
+
+    def _scatter(self) -> float:
+        """Standard deviation of the outcomes of random movements, each executed twice."""
+        if not self.noise:
+            return 0.0
+        one, other = (self._tried(REPEATED, execution)[1] for execution in ("one", "other"))
+        return float(np.sqrt(np.nanmean(np.square(one - other)) / 2))
 
     def _explored(self, rest: Array, names: Sequence[str], file: str) -> list[Array]:
         """Corners of T, found by random movements."""
@@ -293,5 +375,7 @@ class MujocoRobot:
         contexts = np.stack([self.contexts.sample(rng) for rng in rngs])
         thetas = np.stack([self.policies.sample(rng) for rng in rngs])
         ends = self.execute_many(contexts, thetas, [stream(0, execution, k) for k in range(n)])
-        starts = np.zeros_like(ends) if self._displacement else np.stack([self._read(self._start(c)) for c in contexts])
+        starts = (
+            np.zeros_like(ends) if self._displacement else np.stack([self._read(self.start_in(c)) for c in contexts])
+        )
         return starts, ends

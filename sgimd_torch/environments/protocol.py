@@ -8,15 +8,14 @@ Section 2.1 of Nguyen & Oudeyer (2014): M(c, theta) = tau. An environment of you
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.spaces import Array, Box, check_point, check_vector, first_entry, read_only
+from sgimd_torch.spaces import Array, Box, check_point, check_vector, first_entry
 
 MEMBERS: Final = ("contexts", "policies", "outcomes", "rest", "outcome_noise", "observe", "execute")
 
@@ -116,10 +115,18 @@ class HasPrimitive(Protocol):
 
 @runtime_checkable
 class FromFiles(Protocol):
-    """An environment that is read from files, whose checksums a run keeps; ``remarks`` are sentences for the user."""
+    """An environment that is read from files.
+
+    Attributes:
+        files: files whose checksums a run keeps.
+        remarks: sentences for the user.
+        found: values of the options that the environment finds by movements if they are not given. A run keeps them in
+            its settings, so they are found once. The class lists the names of these options as ``FOUND``.
+    """
 
     files: Sequence[Path]
     remarks: Sequence[str]
+    found: Mapping[str, Any]
 
 
 def primitive_of(environment: Environment) -> Primitive:
@@ -127,60 +134,6 @@ def primitive_of(environment: Environment) -> Primitive:
     found = environment.primitive if isinstance(environment, HasPrimitive) else None
     return found if isinstance(found, Primitive) else Primitive()
 
-
-class Trace(Protocol):
-    """A movement that can be filmed: a `Sketch`, or the `RodTrace` of the fishing rod."""
-
-    @property
-    def outcome(self) -> Array:
-        """``(outcome_dim,)``, equal to the outcome of ``execute`` with an equal random stream."""
-        ...
-
-    @property
-    def landed(self) -> float:
-        """Time (s) from the start of the movement until its outcome is reached."""
-        ...
-
-
-@dataclass(frozen=True, eq=False)
-class Sketch:
-    """Drawings of a movement for `sgimd film`.
-
-    An environment may have a method ``trace(context, theta, rng)`` that returns a Sketch.
-
-    Args:
-        outcome: ``(outcome_dim,)``, equal to the outcome of ``execute`` with an equal random stream. Its first two
-            dimensions are x and y in the drawing; if it has one dimension, y is 0.
-        step: time between two drawings (s).
-        chains: ``(n_steps, n_points, 2)``, points of the robot, which the film joins by lines; a single point is drawn
-            as a ball. The film also shows the path of the last point.
-
-    Raises:
-        ValueError: an array has another shape or is not finite, or the step is not above 0.
-    """
-
-    outcome: Array
-    step: float
-    chains: Array
-
-    def __post_init__(self) -> None:
-        for name, axes, wanted in (("outcome", 1, "(outcome_dim,)"), ("chains", 3, "(n_steps, n_points, 2)")):
-            value = np.asarray(getattr(self, name))
-            numbers = value.size > 0 and value.dtype.kind in "iuf" and np.isfinite(value).all()
-            if not numbers or value.ndim != axes or (name == "chains" and value.shape[2] != 2):
-                raise ValueError(f"{name} of a Sketch must be finite numbers {wanted}, got shape {value.shape}")
-            object.__setattr__(self, name, read_only(value.astype(np.float64)))
-        if not 0 < self.step < np.inf:
-            raise ValueError(f"step of a Sketch must be above 0 s, got {self.step}")
-
-    @property
-    def landed(self) -> float:
-        """Duration (s) of the movement."""
-        return self.step * (len(self.chains) - 1)
-
-
-Tracer = Callable[[Array, Array, np.random.Generator], Trace]
-"""Function (context, theta, rng) -> movement that can be filmed."""
 
 FAILURES: Final = 10
 """Number of successive failed movements after which a run ends."""
@@ -258,26 +211,6 @@ def _numbers(what: str, value: Any, *shape: int) -> Array:
         got = type(value).__name__ if array.ndim == 0 else f"{array.dtype} {array.shape}"
         raise ValueError(f"{what} must give numbers of shape {shape}, got {got}; is there a return?")
     return array.astype(np.float64)
-
-
-def traced(environment: Environment, trace: Tracer, context: Array, theta: Array, rng: np.random.Generator) -> Trace:
-    """Call ``trace``, the optional method of ``environment``, and check the result.
-
-    Raises:
-        ValueError: ``trace`` fails, or its result cannot be drawn.
-    """
-    name, dim = type(environment).__name__, environment.outcomes.dim
-    try:
-        found = trace(context, theta, rng)
-    except Exception as error:  # code of the user may raise anything
-        raise ValueError(f"trace() of {name} failed: {type(error).__name__}: {error}") from error
-    if hasattr(found, "states"):  # the RodTrace of the fishing rod
-        return found
-    if not isinstance(found, Sketch) or len(found.outcome) != dim:
-        what = f"one of {len(found.outcome)}" if isinstance(found, Sketch) else type(found).__name__
-        wanted = f"a Sketch with an outcome of {dim} dimension{'s' * (dim != 1)}"
-        raise ValueError(f"trace() of {name} must give {wanted}, got {what}")
-    return found
 
 
 def check_movement(environment: Environment, context: ArrayLike, theta: ArrayLike) -> tuple[Array, Array]:

@@ -14,7 +14,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colorbar import Colorbar
 from numpy.typing import ArrayLike
 
-from sgimd_torch.spaces import Array, Box
+from sgimd_torch.spaces import Array, Box, rounded
 
 LEGEND: Final[dict[str, Any]] = {
     "loc": "lower center",
@@ -44,12 +44,6 @@ def limits(points: Array, space: Box) -> Box:
     step = np.array([rounded((side or longest) / 40) for side in (high - low).tolist()])
     low, high = np.floor(low / step) * step, np.ceil(high / step) * step
     return replace(space, low=low, high=np.where(high > low, high, low + step))
-
-
-def rounded(length: float) -> float:
-    """The least 1, 2 or 5 times a power of ten that is not below ``length``."""
-    power = 10.0 ** np.floor(np.log10(length))
-    return float(power * next(k for k in (1, 2, 5, 10) if power * k >= length))
 
 
 def alike(sides: Array) -> bool:

@@ -16,10 +16,10 @@ from matplotlib.colors import ListedColormap, LogNorm
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import LogLocator, NullLocator
 
-from sgimd_torch.figures.axes import alike, colour_bar, note, rounded
+from sgimd_torch.figures.axes import alike, colour_bar, note
 from sgimd_torch.figures.names import COLOURS, NAMES
 from sgimd_torch.figures.sections import Section
-from sgimd_torch.spaces import Array, Box
+from sgimd_torch.spaces import Array, Box, rounded
 
 __all__ = ["COLOURS", "NAMES"]
 

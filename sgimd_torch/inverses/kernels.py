@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numba import njit
 
-from sgimd_torch.inverses.jit import LISTS, NUMBER, NUMBERS, ROWS, TABLE, called, columns, inner, squared_distance
+from sgimd_torch.memory.jit import LISTS, NUMBER, NUMBERS, ROWS, TABLE, called, columns, inner, squared_distance
 from sgimd_torch.spaces import Array
 
 STEPS, STARTS = 4, 3  # number of Gauss-Newton steps from each start, and of exemplars where steps begin

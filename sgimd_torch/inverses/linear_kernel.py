@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from sgimd_torch.inverses.jit import LISTS, NUMBERS, TABLE, called, columns, inner, squared_distance
+from sgimd_torch.memory.jit import LISTS, NUMBERS, TABLE, called, columns, inner, squared_distance
 from sgimd_torch.spaces import Array
 
 ALPHA, WIDTH = 0.5, 1.0  # weight of a neighbourhood's spread in eq. (8), and width of the Gaussian of eq. (9)

@@ -155,11 +155,8 @@ class PolicyNeighbours:
             if n > len(self._seen):
                 more = Found.none(keys, LISTED)
                 self._seen = np.concatenate((self._seen, np.zeros(n, np.int64)))
-                rows_so_far, squared = (
-                    np.concatenate((lists.rows, more.rows)),
-                    np.concatenate((lists.squared, more.squared)),
-                )
-                self._lists = lists = Found(lists.queries, rows_so_far, squared)
+                found, squared = (np.concatenate(both) for both in zip(lists[1:], more[1:], strict=True))
+                self._lists = lists = Found(lists.queries, found, squared)
             compiled("sgimd_torch.memory.scan").scan_around(keys, rows, self._seen, lists.rows, lists.squared)
             return np.ascontiguousarray(lists.within(within, rows)[:, : min(k, n)])
 

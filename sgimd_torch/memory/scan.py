@@ -10,18 +10,15 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numba import njit, types
+from numba import types
 
+from sgimd_torch.memory.jit import FOUND, ROWS, SEEN, SQUARED, TABLE, called, inner
 from sgimd_torch.spaces import Array
 
 _BLOCK: Final = 128  # number of rows that stay in the cache while all queries are compared with them
-_FAST: Final = {"reassoc"}  # sums may be reordered, so that they use vector registers
-_table, _rows = types.Array(types.float64, 2, "C", readonly=True), types.Array(types.int64, 1, "C", readonly=True)
-_found, _squared = types.Array(types.int64, 2, "C"), types.Array(types.float64, 2, "C")
-_seen = types.Array(types.int64, 1, "C")
 
 
-@njit(nogil=True, fastmath=_FAST)
+@inner
 def _compare(keys: Array, first: int, end: int, query: Array, rows: np.ndarray, squared: Array) -> None:
     """Add the rows from ``first`` to ``end`` to the list of a query."""
     last = len(rows) - 1
@@ -37,7 +34,7 @@ def _compare(keys: Array, first: int, end: int, query: Array, rows: np.ndarray, 
             rows[place], squared[place] = row, distance
 
 
-@njit(types.void(_table, types.int64, _table, _found, _squared), cache=True, nogil=True, fastmath=_FAST)
+@called(TABLE, types.int64, TABLE, FOUND, SQUARED)
 def scan(keys: Array, first: int, queries: Array, rows: np.ndarray, squared: Array) -> None:
     """Add rows to lists of the rows nearest to some queries; of equally near rows the older stays first.
 
@@ -53,7 +50,7 @@ def scan(keys: Array, first: int, queries: Array, rows: np.ndarray, squared: Arr
             _compare(keys, begin, min(begin + _BLOCK, len(keys)), queries[m], rows[m], squared[m])
 
 
-@njit(types.void(_table, _rows, _seen, _found, _squared), cache=True, nogil=True, fastmath=_FAST)
+@called(TABLE, ROWS, SEEN, FOUND, SQUARED)
 def scan_around(keys: Array, asked: np.ndarray, seen: np.ndarray, rows: np.ndarray, squared: Array) -> None:
     """Bring the lists of the rows ``asked`` up to date.
 

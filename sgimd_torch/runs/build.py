@@ -6,12 +6,12 @@ parts = build(Config(seed=3)); for episode in run(parts.learner, parts.environme
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 from sgimd_torch.catalogue import called, function_of, load_word
-from sgimd_torch.environments.protocol import Environment
+from sgimd_torch.environments.protocol import Environment, FromFiles
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.files import checksum
 from sgimd_torch.learner import Learner
@@ -28,7 +28,7 @@ class RunParts:
     """Parts of a run.
 
     Attributes:
-        config: settings of the run.
+        config: settings of the run, with what its robot found by movements.
         task: robot with its goals and demonstrations.
         learner: learner, freshly built.
         teacher: teacher who demonstrates without being asked; None: no teacher.
@@ -66,6 +66,7 @@ def build(config: Config) -> RunParts:
         FileNotFoundError: a file does not exist.
     """
     task = task_of(config)
+    config = with_found(config, task.environment)
     check_at_once(task.environment, config.at_once)
     benchmark, notes, benchmark_crc32 = benchmark_of(task, config.benchmark)
     shown: dict[str, Any] = {}
@@ -134,6 +135,14 @@ def _answers(config: Config, learner: Learner) -> dict[str, Inverse]:
         learnt_with = config.values.get("inverse") == word
         found[word] = learner.inverse if learnt_with else problem.shared(f"answer {word}", make)
     return found
+
+
+def with_found(config: Config, robot: Environment) -> Config:
+    """The settings, with the options that the robot found by movements, such as the corners of T."""
+    found = {
+        f"environment.{name}": value for name, value in (robot.found if isinstance(robot, FromFiles) else {}).items()
+    }
+    return replace(config, parts={**dict(config.parts), **{name: found[name] for name in found if name in config}})
 
 
 def _needs_demonstrations(make: Callable[..., Any]) -> bool:

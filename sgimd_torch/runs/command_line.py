@@ -27,8 +27,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     again = [*program, "run", *argv, *([] if flags["resume"] else ["--resume"])]
     with loading():
         from sgimd_torch.runs.build import build  # imported here so that --help is fast
+        from sgimd_torch.runs.directory import with_found_earlier
         from sgimd_torch.runs.run import carry_out
-    parts = build(config)
+    parts = build(with_found_earlier(config))
     with Stopping() as stopping:
         print(carry_out(parts, stopping, **flags, again=shlex.join(again)))
     return 0

@@ -17,11 +17,12 @@ from pathlib import Path
 from typing import Any, Final
 
 import sgimd_torch
+from sgimd_torch.catalogue import function_of
 from sgimd_torch.environments.protocol import Environment, FromFiles
 from sgimd_torch.files import checksum, make_folder
 from sgimd_torch.record import Dims, Record, RunError
 from sgimd_torch.runs.build import RunParts
-from sgimd_torch.runs.config import EVALUATES, MAY_CHANGE, Config, code_of, differ, words
+from sgimd_torch.runs.config import EVALUATES, MAY_CHANGE, PLACE, Config, code_of, differ, words
 
 FILE: Final = "run.sqlite"
 LONGEST: Final = 504  # bytes, longest path of a file that SQLite opens
@@ -77,6 +78,20 @@ def open_run(parts: RunParts, *, resume: bool, accept_loss: bool = False) -> tup
 def holds_run(path: Path) -> bool:
     """Whether there is a record at ``path``; a process killed at the very beginning leaves an empty file."""
     return path.is_file() and path.stat().st_size > 0
+
+
+def with_found_earlier(config: Config) -> Config:
+    """The settings, with what the robot found by movements when this run began, if the run is on disk."""
+    names = {f"environment.{name}" for name in getattr(function_of(config.chosen["environment"].make), "FOUND", ())}
+    if not names or not holds_run(config.directory / FILE):
+        return config
+    with Record(config.directory / FILE) as record:
+        before = record.about.get("settings", {})
+    own = {name: value for name, value in config.settings.items() if name.startswith("environment")}
+    if any(differ(before.get(name), own[name]) for name in own.keys() - names - {*PLACE}):
+        return config  # it is another robot's run
+    found = {name: before[name] for name in names & before.keys() if name not in dict(config.parts)}
+    return Config.from_settings({**config.settings, **found})
 
 
 def _reopened(

@@ -21,7 +21,7 @@ from sgimd_torch.files import checksum
 from sgimd_torch.learner.events import Kind
 from sgimd_torch.record import DERIVED, Record, RunError, layout
 from sgimd_torch.runs.config import FILES, OWN, PLACE, Config, code_of, differ
-from sgimd_torch.runs.directory import FILE
+from sgimd_torch.runs.directory import FILE, with_found_earlier
 from sgimd_torch.spaces import Array, Box, Demonstration
 
 Columns = dict[str, np.ndarray]
@@ -268,8 +268,8 @@ def find_runs(place: str | os.PathLike[str]) -> dict[str, list[Path]]:
 def finished(config: Config) -> bool:
     """Whether an undamaged run with these settings is on disk, complete with its last evaluation."""
     try:
-        run = read_run(config.directory)
-        found, wanted = run.config, config.settings
+        run, wanted = read_run(config.directory), with_found_earlier(config).settings
+        found = run.config
         names = (found.keys() | wanted.keys()) - {*PLACE}
         others = any(differ(found.get(name), wanted.get(name)) for name in names)
         return bool(run.summary["finished"] and not others) and all(

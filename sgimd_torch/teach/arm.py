@@ -38,6 +38,8 @@ class Arm:
 
     def __init__(self, led: HandLed) -> None:
         self._model, self.data = led.model, mujoco.MjData(led.model)
+        if led.positions is not None:
+            self.data.qpos = led.positions
         self._numbers = [self._number(mujoco.mjtObj.mjOBJ_JOINT, name, "joint") for name in led.joints]
         for name, number in zip(led.joints, self._numbers, strict=True):
             if int(self._model.jnt_type[number]) not in TURN_OR_SLIDE:
@@ -53,7 +55,8 @@ class Arm:
         self.accelerations = _limits("accelerations", 6 * pace if led.accelerations is None else led.accelerations, n)
         start = self.ranges.clip(self.data.qpos[self._angles]) if led.start is None else led.start
         self.start = read_only(self.ranges.check("start", check_point("start", start, n), "are they in rad?"))
-        self.links = tuple(self._model.body(k).name for k in range(self._model.nbody) if not self._trouble(k))
+        names = {k: self._model.body(k).name for k in range(self._model.nbody)}
+        self.links = tuple(name for k, name in names.items() if name and not self._trouble(k))
 
     def pose(self, q: Array) -> None:
         """Take the posture ``q``, ``(n_joints,)`` rad."""

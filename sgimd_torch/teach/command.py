@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Final
 from sgimd_torch.record import ReplayError
 from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.config import Config
+from sgimd_torch.runs.directory import with_found_earlier
 from sgimd_torch.runs.process import Failed, loading, parser_of, say
 from sgimd_torch.runs.read import config_of, read_run
 from sgimd_torch.session import NoOutcomeError
@@ -49,11 +50,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     config, port = options_of(sys.argv[1:] if argv is None else argv)
     token = secrets.token_urlsafe(16)
     with loading():
-        from sgimd_torch.runs.build import task_of
-        from sgimd_torch.teach.led import hand_led_of
         from sgimd_torch.teach.page import Page
         from sgimd_torch.teach.taught import TaughtRun
-    hand_led_of(task_of(config))  # refuses a robot that cannot be led, before anything is written
     taught = TaughtRun(config)
     with serving(port, token) as server:
         page = Page(server, taught)
@@ -112,4 +110,4 @@ def options_of(argv: Sequence[str]) -> tuple[Config, int]:
     config, _ = parse(words)
     if "teacher" in config:
         config, _ = parse([f"--teacher={BY_HAND}", *words])
-    return config, options.port
+    return with_found_earlier(config), options.port

@@ -6,7 +6,7 @@ The arm, the rod and robots from model files are known here. A robot of your own
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -27,7 +27,7 @@ class HandLed:
     """A robot that a person can lead by the hand; `Arm` checks it.
 
     Args:
-        model: MuJoCo model; its initial posture is the start of all movements, except for the led joints.
+        model: MuJoCo model of the robot and its objects.
         joints: names of the joints that a policy moves, in the order of a recording's columns.
         hand: name of the body or site by which a person usually leads the robot.
         ranges: ``(n_joints,)`` ranges (rad; m for a slide joint); None for the ranges in the model.
@@ -36,6 +36,11 @@ class HandLed:
             None for 1.5 times the range per s, the largest speed of a smooth movement of 1 s over the range.
         accelerations: ``(n_joints,)`` rad/s^2, largest accelerations of the robot's own movements; None for 6 times the
             range per s^2.
+        positions: ``(nq,)`` positions of all joints at the start of movements, except for the led ones; None for the
+            initial positions of the model.
+        hidden: names of bodies that are not drawn.
+        place: function from points of T ``(n, outcome_dim)`` to positions in the world ``(n, 3)`` m; None if the first
+            two dimensions are x and y.
     """
 
     model: mujoco.MjModel
@@ -45,6 +50,9 @@ class HandLed:
     start: Array | None = None
     speeds: Array | None = None
     accelerations: Array | None = None
+    positions: Array | None = None
+    hidden: tuple[str, ...] = ()
+    place: Callable[[Array], Array] | None = None
 
 
 @runtime_checkable
@@ -71,8 +79,14 @@ def hand_led_of(task: Task) -> HandLed:
     elif isinstance(robot, PlanarArm):
         led = arm_led(robot)
     elif isinstance(robot, MujocoRobot) and isinstance(robot.primitive, GaussianPrimitive) and robot.joints:
-        fastest = robot.primitive.fastest()
-        led = HandLed(robot.model, robot.joints, robot.hand, robot.primitive.joints, robot.start, *fastest)
+        start = robot.start_in((robot.contexts.low + robot.contexts.high) / 2)  # as in a lesson
+        measured = robot.located(robot.rest[None], start).shape[1] > 0  # else T is of joints
+        led = HandLed(
+            *(robot.model, robot.joints, robot.hand, robot.primitive.joints, robot.start),
+            *robot.primitive.fastest(),
+            positions=robot.positions(start),
+            place=(lambda points: robot.located(points, start)[:, 0]) if measured else None,
+        )
     else:
         raise ValueError(
             f"{type(robot).__name__} cannot be led by the hand: it does not say which joints of which model a hand "
@@ -85,7 +99,9 @@ def hand_led_of(task: Task) -> HandLed:
 def rod_led(rod: FishingRod) -> HandLed:
     """The fishing rod, led by its tip, no faster than its motor primitive moves it."""
     middle = (JOINT_RANGES.low + JOINT_RANGES.high) / 2
-    return HandLed(rod.model, JOINTS, "tip", JOINT_RANGES, middle, *rod.primitive.fastest())
+    names = [rod.model.body(k).name for k in range(rod.model.nbody)]
+    line = tuple(name for name in names if name.startswith(("line", "float")))
+    return HandLed(rod.model, JOINTS, "tip", JOINT_RANGES, middle, *rod.primitive.fastest(), hidden=line)
 
 
 def arm_led(arm: PlanarArm) -> HandLed:

@@ -20,7 +20,6 @@ import viser
 from sgimd_torch.demonstrations.units import moving
 from sgimd_torch.spaces import Array
 from sgimd_torch.teach.leading import Leading
-from sgimd_torch.teach.led import hand_led_of
 from sgimd_torch.teach.lessons import HandLesson
 from sgimd_torch.teach.panel import Panel
 from sgimd_torch.teach.scene import Scene
@@ -48,16 +47,16 @@ class Page:
         running: whether the learner moves by itself, False at first.
 
     Raises:
-        ValueError: the robot cannot be led by the hand.
+        ValueError: the robot does not fit its model, see `Arm`.
     """
 
     def __init__(self, server: viser.ViserServer, taught: TaughtRun) -> None:
         self.server, self.taught = server, taught
-        robot, led = taught.parts.environment, hand_led_of(taught.parts.task)
+        robot, led = taught.parts.environment, taught.led
         self.leading = Leading(led)
         self._hand, self._offset = led.hand, np.zeros(3)  # (3,) m, vector from the mouse to the held point
-        self.scene = Scene(server, led, self.leading.arm.links, robot.outcomes, taught.parts.benchmark.goals)
-        self.panel = Panel(server, self._act, robot.outcomes, taught.config.movements, taught.cannot_be_taught)
+        self.scene = Scene(server, led, self.leading.arm, robot.outcomes, taught.parts.benchmark.goals)
+        self.panel = Panel(server, self._act, robot.outcomes, taught.config.movements)
         self.lesson: HandLesson | None = None
         self.status: Status | None = None
         self.running = False
@@ -142,7 +141,6 @@ class Page:
     def _act(self, name: str, client: viser.ClientHandle) -> None:
         actions: dict[str, Callable[[], object]] = {
             "record": lambda: self._record(client),
-            "home": self.leading.home,
             "discard": lambda: self._set_lesson(None),
             "show": lambda: self._give_lesson(client),
             "run": self._run_or_pause,
@@ -164,13 +162,15 @@ class Page:
         self.leading.release()
         if self.leading.recording:
             self.leading.end_recording()
+            self.leading.home()
             self.panel.show_recording(False)
 
     def _record(self, client: viser.ClientHandle) -> None:
-        """Begin a recording, or end the present recording and make a lesson of it."""
+        """Begin a recording at the start of movements, or end it, make a lesson of it, and go back to the start."""
         self._set_lesson(None)
         self.panel.show_recording(not self.leading.recording)
         if not self.leading.recording:
+            self.leading.home()
             self.leading.begin_recording()
             return
         try:
@@ -178,6 +178,8 @@ class Page:
         except ValueError as error:
             self._set_lesson(None, str(error))
             return
+        finally:
+            self.leading.home()
         future = self._learner.submit(self.taught.lesson_of, *recording)
         future.add_done_callback(lambda done: self._later(client, lambda: self._lesson_made(done)))
 

@@ -1,13 +1,12 @@
 """The controls of the page: three numbered steps, and the status of the learner.
 
-    panel = Panel(server, act, space, 5000, ""); panel.show_lesson(lesson); panel.show_status(status, running=True)
+    panel = Panel(server, act, space, 5000); panel.show_lesson(lesson); panel.show_status(status, running=True)
 A button calls ``act(name, client)``: ``name`` is its key in ``ACTIONS``, ``client`` the viewer who pressed it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from html import escape
 from typing import Any, Final
 
 import numpy as np
@@ -24,24 +23,25 @@ RECORD, STOP = ("Record", ICON.PLAYER_RECORD), ("Stop", ICON.PLAYER_STOP)
 RUN, PAUSE = ("Let the learner go on", ICON.PLAYER_PLAY), ("Pause the learner", ICON.PLAYER_PAUSE)
 ACTIONS: Final[dict[str, tuple[str, Any, Any]]] = {
     "record": (*RECORD, "red"),
-    "home": ("Arm back to its start", ICON.HOME, "gray"),
     "discard": ("Throw it away", ICON.TRASH, "gray"),
     "show": ("Show it to the learner", ICON.SCHOOL, "green"),
     "run": (*RUN, "blue"),
 }
 """Label, icon and colour of each button."""
-LEAD: Final = "Press **Record**, **drag the orange ball** (or any part of the arm) as in a throw, press **Stop**."
+LEAD: Final = (
+    "Press **Record**, **drag the orange ball** (or any part of the arm), press **Stop**. "
+    "The arm goes back to its start by itself."
+)
 LOOK: Final = "Nothing recorded yet."
 SEEN: Final = (
-    "The ground is the task space, {0}: light where the learner can land, dark where it cannot land yet. "
+    "The coloured map is the task space, {0}: light where an outcome came near, dark where none did yet. "
     "The orange ball is the hand of the robot. Small dots are goals of the benchmark."
 )
 _STATUS: Final = (
     '<div style="padding:0 .6em;line-height:1.5"><b style="font-size:1.1em">{0}</b><br>{1} of {2} movements<br>'
-    "lessons by hand: {3}<br>predicted error <b>{4}</b><br>{5} of {6} goals within reach</div>"
-    '<div style="color:#a33;padding:0 .6em">{7}</div>'
+    "{3} by hand<br>predicted error <b>{4}</b><br>{5} of {6} goals within reach</div>"
     '<div style="padding:0 .6em;font-size:.85em;line-height:1.5"><b style="color:#f0781e">●</b> you &nbsp; '
-    '<b style="color:#3c46be">●</b> where the learner landed<br><b style="color:#0a6e32">●</b> goals within '
+    '<b style="color:#3c46be">●</b> latest outcomes<br><b style="color:#0a6e32">●</b> goals within '
     'reach &nbsp; <b style="color:#788ca0">●</b> goals still too far</div>'
 )
 _LEGEND: Final = (
@@ -58,12 +58,11 @@ class Panel:
         act: function to call when a button is pressed.
         space: T.
         total: number of movements of the whole run.
-        cannot: reason why the learner cannot be taught, "" if it can.
     """
 
-    def __init__(self, server: viser.ViserServer, act: Act, space: Box, total: int, cannot: str) -> None:
+    def __init__(self, server: viser.ViserServer, act: Act, space: Box, total: int) -> None:
         self._gui: Any = server.gui
-        self._act, self._space, self._total, self._cannot = act, space, total, cannot
+        self._act, self._space, self._total = act, space, total
         self.buttons: dict[str, Any] = {}
         gui = server.gui
         gui.configure_theme(
@@ -76,7 +75,6 @@ class Panel:
         with gui.add_folder("1 · Lead the arm"):
             gui.add_markdown(LEAD)
             self._add_button("record")
-            self._add_button("home")
         with gui.add_folder("2 · Look at what you recorded"):
             self.lesson = gui.add_markdown(LOOK)
             self._add_button("discard")
@@ -112,7 +110,7 @@ class Panel:
             self.lesson.content = f"**This is no lesson:** {problem}" if problem else LOOK
             return
         place = ", ".join(f"{x:.2f}" for x in lesson.demonstration.outcome)
-        words = f"It lands at **({place}) {self._space.unit}**, the orange ring."
+        words = f"Its outcome is **({place}) {self._space.unit}**, the orange ring."
         if np.isfinite(lesson.misfit):
             words += f" The robot repeats your movement to **{lesson.misfit:.3f} rad** (root mean square)."
         remarks = lesson.remarks or ["the robot can follow everything"]
@@ -133,5 +131,7 @@ class Panel:
         if now.movements >= self._total:
             doing = "all movements are made"
         error, met = self._space.amount(now.chart.mean_error, ".3f"), now.chart.met
-        counts = (now.movements, self._total, now.lessons, error, int(met.sum()), len(met))
-        self.status.content = _STATUS.format(doing, *counts, escape(self._cannot))
+        lessons = f"{now.lessons} lesson{'s' * (now.lessons != 1)}"
+        self.status.content = _STATUS.format(
+            doing, now.movements, self._total, lessons, error, int(met.sum()), len(met)
+        )

@@ -1,12 +1,11 @@
-"""The scene: the robot that a hand leads, and the map of T on the ground.
+"""The scene: the robot that a hand leads, its objects, and the map of T.
 
-    scene = Scene(server, led, links, outcomes, goals); scene.draw_arm(leading.data, leading.hand)
-The map of T lies in the plane z = 0 of the model, at the places of the outcomes, so movements end on the map.
+    scene = Scene(server, led, arm, outcomes, goals); scene.draw_arm(arm.data, leading.hand)
+The map lies at the places of the outcomes, so movements end on the map, or above it if T has three dimensions.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from typing import Any, Final
 
 import mujoco
@@ -15,22 +14,25 @@ import trimesh
 import viser
 from viser.transforms import SO3
 
-from sgimd_torch.spaces import Array, Box
+from sgimd_torch.spaces import Array, Box, rounded
+from sgimd_torch.teach.arm import Arm
 from sgimd_torch.teach.chart import CELLS, SKILL, Chart, by_error
 from sgimd_torch.teach.led import HandLed
 
 HAND, LEARNER, MET, UNMET = (240, 120, 30), (60, 70, 190), (10, 110, 50), (120, 140, 160)
 ABOVE: Final = 0.002  # distance from one layer of the map to the next, as a share of the map's longer side
+NUMBERS: Final = 5  # largest number of steps between the numbers of an axis
+CAMERA: Final = np.array([0.32, -0.92, 0.66])  # from the middle of the scene, in sizes of the scene
 SEEN: Final = 1e-4  # share of the map's longer side; a robot that has moved less is not drawn again
 
 
 class Scene:
-    """The robot and the map of T, drawn in a browser.
+    """The robot, its objects and the map of T, drawn in a browser.
 
     Args:
         server: web server of the page.
         led: model and led joints of the robot.
-        links: names of the bodies that a hand leads; other bodies, such as the line of the rod, are not drawn.
+        leading: the arm in its present posture.
         outcomes: T.
         goals: ``(n_goals, outcome_dim)`` goals of the benchmark.
 
@@ -38,41 +40,42 @@ class Scene:
         grips: name and picture of each body that can be dragged, the hand first.
     """
 
-    def __init__(
-        self, server: viser.ViserServer, led: HandLed, links: Collection[str], outcomes: Box, goals: Array
-    ) -> None:
-        self._scene, self._outcomes = server.scene, outcomes
-        self._model = model = led.model
-        self.size = float(outcomes.sides[:2].max())
-        middle = self.ground((outcomes.low + outcomes.high) / 2)
-        blank = np.full((CELLS, CELLS, 3), SKILL[0], dtype=np.uint8)
-        width = outcomes.sides[0]
-        height = outcomes.sides[1] if outcomes.dim > 1 else width / 10
-        self.map = self._scene.add_image("/map", blank, width, height, format="png", wxyz=(0, 1, 0, 0), position=middle)
+    def __init__(self, server: viser.ViserServer, led: HandLed, arm: Arm, outcomes: Box, goals: Array) -> None:
+        self._scene, self._outcomes, self._led, self._model = server.scene, outcomes, led, led.model
+        low, high = outcomes.low, outcomes.high
+        origin = self._placed(low)
+        along, across = self._edges()
+        self._up = np.cross(along, across) / np.linalg.norm(np.cross(along, across))
+        self._up *= np.sign(self._up @ CAMERA)
+        links = [arm.data.body(name).xpos for name in arm.links]
+        seen = np.stack([origin, origin + along, origin + across, origin + along + across, self._placed(high), *links])
+        self.size = float(np.ptp(seen, axis=0).max())
+        self._add_map(origin, along, across)
         self._goals = self._points("/goals", self.ground(goals, 3), UNMET, 0.006)
         self._landings = self._points("/landings", np.zeros((1, 3)), LEARNER, 0.01)
-        led_bodies = {model.body(name).id for name in links}
-        shown = [k for k in range(model.ngeom) if model.geom_bodyid[k] in led_bodies]
-        self._drawn = np.full((model.ngeom, 3), np.inf)
+        names = [self._model.body(k).name for k in self._model.geom_bodyid]
+        shown = [k for k, name in enumerate(names) if name not in led.hidden and _is_seen(self._model, k)]
+        self._drawn = np.full((self._model.ngeom, 3), np.inf)
         self._geoms = {k: self._add_geom(k) for k in shown}
         self._hand = self._scene.add_icosphere("/hand", radius=0.026 * self.size, color=HAND, subdivisions=3)
         ring = trimesh.creation.torus(0.03 * self.size, 0.006 * self.size, 32, 8)
         self._mark = self._scene.add_mesh_simple("/mark", ring.vertices, ring.faces, color=HAND, visible=False)
-        names = [model.body(model.geom_bodyid[k]).name for k in shown]
-        self.grips = [(led.hand, self._hand), *zip(names, self._geoms.values(), strict=True)]
+        grips = [(names[k], handle) for k, handle in self._geoms.items() if names[k] in arm.links]
+        self.grips = [(led.hand, self._hand), *grips]
         # Without a GPU a browser draws 25 pictures a second, but only two with environment map, shadows or water.
         self._scene.configure_environment_map(None)
         self._scene.configure_default_lights(cast_shadow=False)
         self._scene.add_light_ambient("/light", intensity=0.6)
-        self._look(server, middle)
+        flat = float(np.ptp(seen[:, 2])) < 1e-6  # then it is seen from above
+        middle = (seen.min(axis=0) + seen.max(axis=0)) / 2
+        away = np.array([0, -0.01, 1.05]) if flat else CAMERA * (1.3 if outcomes.dim > 2 else 1.0)
+        server.initial_camera.position = tuple(middle + self.size * away)
+        server.initial_camera.look_at = tuple(middle)
+        server.scene.set_up_direction("+y" if flat else "+z")
 
     def ground(self, points: Array, layer: int = 0) -> Array:
         """Scene points ``(..., 3)`` m of places ``(..., outcome_dim)`` in T; a greater ``layer`` lies higher."""
-        points = np.asarray(points)
-        flat = np.zeros((*points.shape[:-1], 3))
-        flat[..., : min(2, points.shape[-1])] = points[..., :2]
-        flat[..., 2] = layer * ABOVE * self.size
-        return flat
+        return self._placed(points) + layer * ABOVE * self.size * self._up
 
     def draw_arm(self, data: Any, hand: Array) -> None:
         """Draw the robot in the posture of ``data``, and its ``hand`` ``(3,)`` m."""
@@ -111,15 +114,65 @@ class Scene:
         colour = np.round(255 * _rgba(self._model, k)[:3]).astype(np.uint8)
         return self._scene.add_mesh_simple(f"/arm/{k}", shape.vertices, shape.faces, color=colour)
 
-    def _look(self, server: viser.ViserServer, middle: Array) -> None:
-        """Place the camera: on the shore, or above a robot that lies in the plane of the map."""
-        data = mujoco.MjData(self._model)
-        mujoco.mj_kinematics(self._model, data)
-        flat = float(np.ptp(data.xpos[1:, 2])) < 1e-6 and abs(float(data.xpos[1, 2])) < 1e-6
-        away = np.array([0.0, -0.01, 1.05]) if flat else np.array([0.32, -0.92, 0.66])
-        server.initial_camera.position = tuple(middle + away * self.size)
-        server.initial_camera.look_at = tuple(middle + np.array([0.0, 0.0 if flat else 0.06, 0.0]) * self.size)
-        server.scene.set_up_direction("+z" if not flat else "+y")
+    def _placed(self, points: Array) -> Array:
+        """Positions ``(..., 3)`` m in the world of points ``(..., outcome_dim)`` of T."""
+        rows = np.reshape(points, (-1, self._outcomes.dim))
+        if self._led.place is None:
+            placed = np.zeros((len(rows), 3))
+            placed[:, : min(2, self._outcomes.dim)] = rows[:, :2]
+        else:
+            placed = self._led.place(rows)
+        return placed.reshape(*np.shape(points)[:-1], 3)
+
+    def _edge(self, k: int) -> Array:
+        """``(3,)`` m, the edge of T in dimension ``k`` in the world; zeros if the dimension has no direction there."""
+        if k >= self._outcomes.dim:
+            return np.zeros(3)
+        return self._placed(
+            self._outcomes.low + self._outcomes.sides * (np.arange(self._outcomes.dim) == k)
+        ) - self._placed(self._outcomes.low)
+
+    def _edges(self) -> tuple[Array, Array]:
+        """Edges of the map, ``(3,)`` m each. If T has one dimension, the map is a strip."""
+        along, across = self._edge(0), self._edge(1)
+        if not across.any():
+            across = np.cross([0, -1, 0] if along[2] else [0, 0, 1], along) / 10
+        return along, across
+
+    def _add_map(self, origin: Array, along: Array, across: Array) -> None:
+        """Add the map, with numbers and names at the edges of T that begin at ``origin``."""
+        width, height = float(np.linalg.norm(along)), float(np.linalg.norm(across))
+        x, y = along / width, -across / height  # of the picture, whose first row is the upper one
+        self.map = self._scene.add_image(
+            "/map",
+            np.full((CELLS, CELLS, 3), SKILL[0], dtype=np.uint8),
+            *(width, height),
+            format="png",
+            wxyz=SO3.from_matrix(np.stack([x, y, np.cross(x, y)], axis=1)).wxyz,
+            position=origin + (along + across) / 2,
+        )
+        for k, outwards in enumerate((y, -x, y - x)[: self._outcomes.dim]):
+            edge, low, high = self._edge(k), self._outcomes.low[k], self._outcomes.high[k]
+            if not edge.any():
+                continue
+            beside = origin + 0.04 * self.size * outwards
+            step = rounded((high - low) / NUMBERS)
+            for value in step * np.arange(np.ceil(low / step), np.floor(high / step) + 1):
+                place = beside + (value - low) / (high - low) * edge
+                self._label(f"/axes/{k}/{value:g}", f"{value + 0.0:g}", place)
+            self._label(f"/axes/{k}/name", self._outcomes.axis(k), beside + edge / 2 + 0.06 * self.size * outwards)
+            self._scene.add_line_segments(
+                f"/axes/{k}/line", np.stack([origin, origin + edge])[None], UNMET, thickness=0.003 * self.size
+            )
+
+    def _label(self, name: str, text: str, place: Array) -> None:
+        self._scene.add_label(name, text, position=place, anchor="center-center", font_screen_scale=0.8)
+
+
+def _is_seen(model: Any, k: int) -> bool:
+    """Whether a viewer of MuJoCo shows geom ``k`` at first; floors are left out, as the map lies there."""
+    floor = mujoco.mjtGeom(model.geom_type[k]) in (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
+    return bool(not floor and model.geom_group[k] <= 2 and _rgba(model, k)[3] > 0)
 
 
 def _shape(model: Any, k: int) -> Any:

@@ -20,12 +20,16 @@ from sgimd_torch.runs.run import Life
 from sgimd_torch.spaces import Array, Demonstration, stream
 from sgimd_torch.teach.by_hand import BY_HAND, ByHand
 from sgimd_torch.teach.chart import Chart, chart_of
+from sgimd_torch.teach.led import hand_led_of
 from sgimd_torch.teach.lessons import HandLesson, lesson_by_hand
 
 LATEST: Final = 60  # number of landings that the page shows
 IMITATIONS: Final = 10  # largest number of movements that imitate a lesson at once
 NO_MORE: Final = "the learner has made all its {0} movements; end this session, and go on with --movements {1}"
-ALONE: Final = "{0} cannot be shown a lesson by hand; sgim-d, practice-taught, imitation and observation can"
+ALONE: Final = (
+    "{0} cannot be taught by hand, as it learns alone or asks its teachers; sgimd teach begins with practice-taught; "
+    "sgim-d, imitation and observation can be taught, too"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,20 +58,23 @@ class TaughtRun:
         config: settings of the run.
 
     Attributes:
+        config: settings of the run, with what its robot found by movements.
         parts: parts of the run; its teacher is `ByHand`.
-        cannot_be_taught: reason why the learner takes no lessons, "" if it takes them.
+        led: the robot as a hand leads it.
 
     Raises:
-        ValueError: the run cannot be made, or its directory belongs to another run.
+        ValueError: the run cannot be made, its learner or its robot cannot be taught by hand, or its directory belongs
+            to another run; nothing is written then.
         OSError: a file of the run cannot be read.
     """
 
     def __init__(self, config: Config) -> None:
-        self.config, parts = config, build(config)
+        parts = build(config)
+        self.config, self.led = parts.config, hand_led_of(parts.task)
+        if parts.learner.social is None or parts.teachers:
+            raise ValueError(ALONE.format(config.algorithm))
         self._hand = ByHand(teacher=parts.teacher)
         self.parts = replace(parts, teacher=self._hand)
-        teachable = parts.learner.social is not None and not parts.teachers
-        self.cannot_be_taught = "" if teachable else ALONE.format(config.algorithm)
         self._life = Life(self.parts, resume=holds_run(config.directory / FILE))
         self._episodes = self._life.episodes()
         self._lessons = sum(each.kind == "shown" and each.who == BY_HAND for each in self._life.record.events())
@@ -96,11 +103,9 @@ class TaughtRun:
         """Offer a lesson before the next movement.
 
         Raises:
-            ValueError: the learner cannot be taught, or cannot use this lesson; nothing has changed then.
+            ValueError: the learner cannot use this lesson, or not now; nothing has changed then.
         """
         total = self.config.movements
-        if self.cannot_be_taught:
-            raise ValueError(self.cannot_be_taught)
         if self._life.replaying:
             raise ValueError("the run still replays its record; a lesson must wait until that is done")
         if self._life.movements >= total:

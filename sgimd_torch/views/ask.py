@@ -96,14 +96,14 @@ def _answers(
 
 
 def _read(path: Path, box: Box) -> list[list[float]]:
-    """The goals in a file; a first line without numbers is a header."""
+    """The goals in a file; a first line of names is a header."""
     rows = [row for row in csv.reader(path.read_text(encoding="utf-8").splitlines()) if row]
     found = list[list[float]]()
     for number, row in enumerate(rows):
         try:
             found.append([read(cell, float) for cell in row])
         except ValueError as error:
-            if number:
+            if number or not all(cell.strip()[:1].isalpha() for cell in row):
                 raise ValueError(
                     f"{path}: row {number + 1} is no goal of {box.dim} numbers: {','.join(row)}"
                 ) from error

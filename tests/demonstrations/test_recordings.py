@@ -320,6 +320,13 @@ def test_entries_of_a_dataset_have_names(dataset, capsys):
     assert f"x is an entry of several features; write {PLACE}[0] or action[1]" in capsys.readouterr().err
     assert of_dataset(dataset, "lft.pos") is None
     assert "has no feature lft.pos; did you mean lift.pos" in capsys.readouterr().err
+    for names, wanted, told in (
+        (["pan.pos", "pan.pos", "gripper.pos"], "pan.pos", f"a feature has two entries pan.pos; write {STATE}"),
+        (["pan.pos", "lift.pos"], f"{STATE}[0]", f"{STATE} has 3 entries, but names of 2: pan.pos, lift.pos"),
+    ):
+        change(dataset, features={**FEATURES, STATE: {"shape": [len(names)], "names": names}})
+        assert of_dataset(dataset, wanted) is None
+        assert told in capsys.readouterr().err
 
 
 def test_robots_that_record_shares_of_ranges_must_say_their_units(dataset, capsys):
@@ -373,11 +380,12 @@ def moved_to_v1(root):
         (lambda root: last(root).write_bytes(b"PAR1 of another kind"), r"\.parquet cannot be read"),
         (
             lambda root: rewritten(root, "timestamp", ["late"] * 5),
-            r"\.parquet cannot be read: timestamp has no numbers",
+            r"\.parquet cannot be read: timestamp has BYTE_ARRAY, no numbers",
         ),
         (lambda root: rewritten(root, "timestamp", [0.0, 0.1, None, 0.3, 0.4]), r"row \d+: timestamp must be finite"),
         (lambda root: rewritten(root, STATE, [[[0.0, 1.0], [1.0]]] * 5), r"\.parquet cannot be read: setting an array"),
         (emptied, r"cannot be read: it would take \d+ bytes"),
+        (lambda root: rewritten(root, STATE, [[True] * 3] * 5), r"state\.list\.element has BOOLEAN, no numbers"),
         (lambda root: last(root).write_text(POINTER), r"\.parquet is a pointer of Git LFS, .*; git lfs pull gets"),
     ],
 )

@@ -163,6 +163,12 @@ def test_commands_of_a_page_are_understood(page, folder):
                 understand(name, words)
 
 
+@pytest.mark.parametrize("page", PAGES)
+def test_commands_that_a_page_names_exist(page):
+    named = re.findall(r"`sgimd ([a-z]+)", (ROOT / page).read_text(encoding="utf-8"))
+    assert {*named} <= WORDS["command"].keys()
+
+
 def understand(name, words):
     """Read the words of a command up to where it needs what earlier commands would have made."""
     if name == "run":

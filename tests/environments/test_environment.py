@@ -14,11 +14,11 @@ from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.protocol import (
     BatchEnvironment,
     SimulationError,
-    Sketch,
     check_movement,
     check_recording,
     execute_many,
 )
+from sgimd_torch.environments.sketch import Sketch
 from sgimd_torch.spaces import Array, Box, stream
 
 NO_CONTEXT = np.empty(0)
@@ -239,13 +239,28 @@ def test_an_impossible_arm_is_refused(options):
 @pytest.mark.parametrize(
     ("outcome", "step", "chains", "message"),
     [
-        (np.zeros(2), 0.1, np.zeros((5, 2)), r"chains of a Sketch must be finite numbers .* got shape \(5, 2\)"),
-        (np.zeros(2), 0.1, np.zeros((5, 3, 3)), r"\(n_steps, n_points, 2\), got shape \(5, 3, 3\)"),
-        (np.zeros(2), 0.1, np.full((5, 3, 2), np.nan), "chains of a Sketch must be finite"),
-        (np.zeros((1, 2)), 0.1, np.zeros((5, 3, 2)), r"outcome of a Sketch must be finite numbers \(outcome_dim,\)"),
-        (np.zeros(2), 0.0, np.zeros((5, 3, 2)), "step of a Sketch must be above 0 s, got 0.0"),
+        (np.zeros(2), 0.1, [np.zeros((5, 2))], r"each chain of a Sketch must be finite numbers .* got shape \(5, 2\)"),
+        (
+            np.zeros(2),
+            0.1,
+            np.zeros((5, 3, 2)),
+            r"\(n_steps, n_points, 2\), got shape \(3, 2\)",
+        ),  # not a list of chains
+        (np.zeros(2), 0.1, [np.zeros((5, 3, 3))], r"\(n_steps, n_points, 2\) or more, got shapes \[\(5, 3, 3\)\]"),
+        (
+            np.zeros(2),
+            0.1,
+            [np.zeros((5, 3, 2)), np.zeros((4, 1, 2))],
+            r"or more, got shapes \[\(5, 3, 2\), \(4, 1, 2\)",
+        ),
+        (np.zeros(2), 0.1, [], r"must be one array \(n_steps, n_points, 2\) or more, got shapes \[\]"),
+        (np.zeros(2), 0.1, [np.full((5, 3, 2), np.nan)], "each chain of a Sketch must be finite"),
+        (np.zeros((1, 2)), 0.1, [np.zeros((5, 3, 2))], r"outcome of a Sketch must be finite numbers \(outcome_dim,\)"),
+        (np.zeros(2), 0.0, [np.zeros((5, 3, 2))], "step of a Sketch must be above 0 s, got 0.0"),
     ],
 )
-def test_a_sketch_that_cannot_be_drawn_is_refused(outcome: Array, step: float, chains: Array, message: str) -> None:
+def test_a_sketch_that_cannot_be_drawn_is_refused(
+    outcome: Array, step: float, chains: Sequence[Array], message: str
+) -> None:
     with pytest.raises(ValueError, match=message):
         Sketch(outcome, step, chains)

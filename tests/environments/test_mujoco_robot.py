@@ -1,6 +1,7 @@
 """A robot from its model file: its outcome is where the model says, whatever the file; slips are told in a line."""
 
 import re
+import sys
 from functools import partial
 
 import numpy as np
@@ -10,9 +11,11 @@ from runs import about_of
 from sgimd_torch import MujocoRobot, SimulationError, check_environment, stream
 from sgimd_torch.demonstrations.units import moving
 from sgimd_torch.environments.controllers import Sinusoids
-from sgimd_torch.runs.command_line import main
+from sgimd_torch.runs.build import build, with_found
+from sgimd_torch.runs.command_line import main, parse
+from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.process import command
-from sgimd_torch.runs.read import config_of, read_run
+from sgimd_torch.runs.read import config_of, finished, read_run
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.teach.leading import Leading
 from sgimd_torch.teach.led import hand_led_of
@@ -162,6 +165,14 @@ def test_noise_shifts_the_commands_by_its_share_of_their_range(here):
     assert robot.outcome_noise == pytest.approx(0.02 * np.pi, rel=0.3)
 
 
+def test_a_thing_that_trembles_at_rest_was_not_moved(here):
+    robot = MujocoRobot("arm.xml", outcome="body:puck:xy", **CORNERS)
+    assert robot.outcome_noise == 1e-6  # m; with 0, a learner would take the trembling for effects of its movements
+    rested = [robot.execute(NONE, steady(angle, 0), stream(0, "x")) for angle in (-1.0, -1.5, -2.0)]
+    assert np.ptp(rested, axis=0) == pytest.approx(0, abs=robot.outcome_noise)
+    check_environment(robot)
+
+
 def test_a_recording_is_translated_to_the_movement_that_was_recorded(here):
     robot = MujocoRobot("arm.xml", outcome="site:tip:xy", n_knots=6, **CORNERS)
     theta = robot.policies.sample(stream(0, "x"))
@@ -172,13 +183,84 @@ def test_a_recording_is_translated_to_the_movement_that_was_recorded(here):
 def test_the_arm_is_drawn_from_its_base_to_the_outcome(here, options):
     robot = MujocoRobot("arm.xml", outcome="site:tip:xy", **CORNERS, **options)
     drawn = robot.trace(NONE, steady(0.5, 0.5), stream(0, "x"))
-    assert drawn.chains[-1, -1] == pytest.approx(drawn.outcome)
-    assert np.linalg.norm(np.diff(drawn.chains, axis=1)[:, 0], axis=1) == pytest.approx(0.3, abs=1e-3)
+    assert drawn.chains[0][-1, -1] == pytest.approx(drawn.outcome)
+    assert np.linalg.norm(np.diff(drawn.chains[0], axis=1)[:, 0], axis=1) == pytest.approx(0.3, abs=1e-3)
+
+
+def test_the_thing_that_is_pushed_is_drawn_where_it_begins_and_where_it_ends(here):
+    place = "body:puck:x:.3:.5,body:puck:y:-.4:.4"
+    robot = MujocoRobot("arm.xml", outcome="body:puck:xy", context=place, **CORNERS)
+    drawn = robot.trace([0.45, 0.1], np.append([0, 0.3, 0.7, 1, 0.5, 0.5, 0.5, 0.5], 0.5), stream(0, "x"))
+    arm, puck, door, measured = drawn.chains
+    assert [each.shape[1] for each in drawn.chains] == [3, 1, 1, 1]
+    assert puck[0, 0] == pytest.approx([0.45, 0.1], abs=1e-3)
+    assert puck[-1, 0] == pytest.approx(drawn.outcome)
+    assert puck == pytest.approx(measured)
+    assert door == pytest.approx(np.tile([-1, 0], (*door.shape[:2], 1)))
+    assert np.linalg.norm(np.diff(arm, axis=1), axis=2) == pytest.approx(0.3, abs=1e-3)
+    assert drawn.path[:, 0, :2] == pytest.approx(puck[:, 0])
+
+
+def test_joints_are_drawn_in_the_plane_of_their_angles(here):
+    robot = MujocoRobot("arm.xml", outcome="joint:elbow,joint:shoulder", low=(-2, -2), high=(2, 2), displacement=True)
+    drawn = robot.trace(NONE, steady(0.5, -0.4), stream(0, "x"))
+    (angles,) = drawn.chains
+    assert angles[-1, 0] == pytest.approx(drawn.outcome)
+    assert drawn.outcome == pytest.approx([-0.4, 0.5], abs=0.01)
+    assert drawn.path.shape[1] == 0
+
+
+def test_outcomes_are_located_in_the_world_from_where_the_movement_begins(here):
+    places, context = "body:puck:yx,site:tip:z", "body:puck:x:.3:.5"
+    there = MujocoRobot("arm.xml", outcome=places, low=(-1, -1, 0), high=(1, 1, 1), context=context)
+    (puck, tip), _ = there.located([[0.2, 0.7, 0.4], [0.0, 0.0, 0.0]] @ np.eye(3), there.start_in([0.35]))
+    assert puck == pytest.approx([0.7, 0.2, 0.03])
+    assert tip == pytest.approx([0.6, 0, 0.4])
+    shift = MujocoRobot("arm.xml", outcome=places, low=(-1, -1, -1), high=(1, 1, 1), context=context, displacement=True)
+    ((puck, tip),) = shift.located(np.array([[0.2, 0.7, 0.4]]), shift.start_in([0.35]))
+    assert puck == pytest.approx([0.35 + 0.7, 0.3 + 0.2, 0.03])
+    assert tip == pytest.approx([0.6, 0, 0.05 + 0.4])
+
+
+def test_what_was_found_is_given_to_the_next_robot_which_makes_no_movement(here, monkeypatch):
+    options = {"model": "arm.xml", "outcome": "site:tip:xy", "noise": 0.01}
+    first = MujocoRobot(**options)
+    assert first.found.keys() == {*MujocoRobot.FOUND}
+    monkeypatch.setattr(MujocoRobot, "_simulate", lambda *_: pytest.fail("it moved"))
+    second = MujocoRobot(**options, **first.found)
+    assert second.found == first.found
+    assert second.outcome_noise == first.outcome_noise > 0
+    assert second.remarks == []
+
+
+def test_a_run_keeps_what_was_found_and_a_resume_finds_nothing_anew(here, capsys, monkeypatch):
+    monkeypatch.chdir(here)
+    robot = "--environment mujoco --environment.model arm.xml --environment.outcome site:tip:xy --name kept"
+    words = f"{robot} --algorithm random --repeats 0 --evaluate-at []".split()
+    assert command(main, [*words, "--movements", "20"]) == 0
+    assert "T was found by 300 random movements" in capsys.readouterr().err
+    run = read_run(here / "runs/kept/seed-000")
+    assert run.config["environment.low"] == run.spaces["outcomes"].low.tolist()
+    monkeypatch.setattr(MujocoRobot, "_explored", lambda *_: pytest.fail("it explored"))
+    assert finished(parse([*words, "--movements", "20"])[0])
+    assert build(config_of(run)).environment.rest.tolist() == run.config["environment.rest"]
+    assert command(main, [*words, "--movements", "30", "--resume"]) == 0
+    other = [*words, "--movements", "30", "--resume", "--environment.low=-2,-2", "--environment.high=2,2"]
+    assert command(main, other) == 2
+    assert "environment.low was [" in capsys.readouterr().err
+
+
+def test_a_robot_made_by_a_function_of_the_user_has_no_options_to_keep(here):
+    made_by = Config(parts={"environment": "planar-arm-7"})
+    assert with_found(made_by, MujocoRobot("arm.xml", outcome="site:tip:xy", **CORNERS)) == made_by
 
 
 @pytest.mark.parametrize(
     ("options", "said"),
     [
+        ({"rest": (0.0,)}, "rest must have shape (..., 2)"),
+        ({"rest": (5.0, 0.0), **CORNERS}, "rest of the environment"),
+        ({"outcome_noise": -1.0, **CORNERS}, "outcome_noise of the environment must be a standard deviation"),
         ({"outcome": "site:tp"}, "outcome 'site:tp': the model has no site 'tp'; did you mean tip?"),
         ({"outcome": "site:puck"}, "the model has no site 'puck'; write body:puck"),
         ({"outcome": "tip"}, "write KIND:NAME, such as site:tip; kinds are site, body, geom, joint"),
@@ -204,6 +286,27 @@ def test_a_slip_is_told_in_one_line(here, options, said):
     with pytest.raises(ValueError, match=re.escape(said)) as raised:
         MujocoRobot(**{"model": "arm.xml", "outcome": "site:tip:xy", **options})
     assert "\n" not in str(raised.value)
+
+
+def test_a_model_of_the_menagerie_needs_its_name_alone(here, monkeypatch):
+    pytest.importorskip("mujoco_menagerie", reason="needs the package mujoco-menagerie, which no extra installs")
+    monkeypatch.setenv("MENAGERIE_ROOT", str(here / "menagerie"))
+    (here / "menagerie/robotstudio_so101").mkdir(parents=True)
+    for name in ("arm.xml", "tooth.obj"):
+        scene = here / "menagerie/robotstudio_so101" / name.replace("arm", "scene")
+        scene.write_text((here / name).read_text())
+    robot = MujocoRobot("menagerie:robotstudio_so101", outcome="site:tip:xy", **CORNERS)
+    assert [path.name for path in robot.files] == ["scene.xml", "tooth.obj"]
+    with pytest.raises(ValueError, match=r"model menagerie:robotstudio_so10: Unknown robot .* Did you mean"):
+        MujocoRobot("menagerie:robotstudio_so10", outcome="site:tip:xy")
+    with pytest.raises(ValueError, match="model menagerie:aloha: 'aloha' not found"):
+        MujocoRobot("menagerie:aloha", outcome="site:tip:xy")
+
+
+def test_without_the_package_the_menagerie_is_refused_with_what_to_install(here, monkeypatch):
+    monkeypatch.setitem(sys.modules, "mujoco_menagerie", None)
+    with pytest.raises(ValueError, match="menagerie:aloha needs a package that is not installed: pip install"):
+        MujocoRobot("menagerie:aloha", outcome="site:tip")
 
 
 def test_a_model_that_diverges_is_told(here):
@@ -243,5 +346,14 @@ def test_an_arm_is_led_by_its_tip_to_where_its_movement_then_ends(here):
         leading.step(0.02)
     lesson = lesson_by_hand(*moving(*leading.end_recording()), Task(robot), stream(0, "x"))
     assert lesson.demonstration.outcome == pytest.approx([0.45, 0.2], abs=0.03)
-    pushing = MujocoRobot("arm.xml", outcome="body:puck:xy", **CORNERS)
-    assert hand_led_of(Task(pushing)).hand == "fore"
+
+
+@pytest.mark.parametrize(("sites", "hand"), [("", "tip"), ('<site name="wrist"/>', "wrist"), (None, "unnamed_2")])
+def test_an_arm_that_pushes_is_led_by_its_outermost_site_or_else_by_its_last_body(here, sites, hand):
+    arm = ARM.replace('<body name="fore" pos', "<body pos")
+    tip = '<site name="tip" pos=".3 0 0"/>'
+    (here / "pushing.xml").write_text(arm.replace(tip, f"{sites}{tip}" if sites is not None else ""))
+    pushing = MujocoRobot("pushing.xml", outcome="body:puck:xy", **CORNERS)
+    led = hand_led_of(Task(pushing))
+    assert led.hand == hand
+    Leading(led).grab()

@@ -1,5 +1,7 @@
 """Where most movements do nothing: which had an effect, who answers, and where to look next."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -13,7 +15,7 @@ from sgimd_torch.explore.widening import Widening
 from sgimd_torch.inverses.among_effects import AmongEffects
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.memory import Memory
-from sgimd_torch.runs.tasks.robots import toy_benchmark
+from sgimd_torch.runs.tasks.toys import toy_benchmark
 from sgimd_torch.session import run
 from worlds import NO_CONTEXT, problem
 
@@ -162,3 +164,17 @@ def test_it_varies_more_the_more_often_the_effect_persists():
             memory.add([], look(NO_CONTEXT), [rng.uniform(1, 2) if persists else 0.0])
         widths.append(look.width.sd)
     assert widths[0] > 5 * widths[1]
+
+
+def test_exploration_can_begin_with_uniform_movements():
+    robot = crawler()
+    learner = practice(robot, 0, explore=partial(Returning, first=30))
+    origins = [episode.move.origin for episode in run(learner, robot, 0, movements=120)]
+    assert origins[:30] == ["global"] * 30
+    assert origins[30:].count("global") < 60
+    sides = robot.policies.sides
+    assert (learner.memory.thetas[:30].std(axis=0) > 0.2 * sides).all()  # .29 if uniform, .1 around the middle
+    usual = practice(robot, 0)
+    for _ in run(usual, robot, 0, movements=30):
+        pass
+    assert (usual.memory.thetas.std(axis=0) < 0.2 * sides).all()

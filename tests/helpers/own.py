@@ -3,7 +3,8 @@
 MODULE = '''
 import numpy as np
 from sgimd_torch import Box
-from sgimd_torch.environments.protocol import Sketch, check_movement
+from sgimd_torch.environments.protocol import check_movement
+from sgimd_torch.environments.sketch import Sketch
 
 class Slider:
     """A slider: theta in [0, 1] is its place in each dimension, which a context, if there is one, shifts."""
@@ -25,7 +26,7 @@ class Slider:
     def trace(self, context, theta, rng):
         outcome = self.execute(context, theta, rng)
         x, y = np.linspace(0, 1, 11), np.sin(np.pi * np.linspace(0, 1, 11))
-        return Sketch(outcome, 0.1, np.stack([outcome[0] * x, y], axis=1)[:, None])
+        return Sketch(outcome, 0.1, [np.stack([outcome[0] * x, y], axis=1)[:, None]])
 
 class Slider2(Slider):
     dim = 2
@@ -45,11 +46,11 @@ class WrongPicture(Slider):
 
 class StillPicture(Slider):
     def trace(self, context, theta, rng):
-        return Sketch(np.zeros(1), 0.1, np.zeros((5, 1, 2)))
+        return Sketch(np.zeros(1), 0.1, [np.zeros((5, 1, 2))])
 
 class OtherPicture(Slider):
     def trace(self, context, theta, rng):
-        return Sketch(np.zeros(2), 0.1, np.zeros((5, 1, 2)))
+        return Sketch(np.zeros(2), 0.1, [np.zeros((5, 1, 2))])
 
 class LostPicture(Slider):
     def trace(self, context, theta, rng):

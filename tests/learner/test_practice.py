@@ -10,7 +10,7 @@ from sgimd_torch.evaluation import evaluate
 from sgimd_torch.goals.uniform import UniformGoals
 from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.learner import Learner
-from sgimd_torch.runs.tasks.robots import toy_benchmark
+from sgimd_torch.runs.tasks.toys import toy_benchmark
 from sgimd_torch.searches.perturb import Perturb
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Demonstration

@@ -34,7 +34,7 @@ LIBRARIES = {  # rooms or single files that may import a library, by library
     "scipy": ROW.keys() - {"spaces"},
     "lazy_loader": {"__init__"},
     "faiss": {"memory/neighbours"},
-    "numba": {"memory/compiled", "memory/scan", "inverses/jit", "inverses/kernels"},
+    "numba": {"memory/compiled", "memory/scan", "memory/jit", "inverses/kernels"},
     "mujoco": {
         "environments/rod_physics",
         "environments/mujoco_model",
@@ -42,6 +42,7 @@ LIBRARIES = {  # rooms or single files that may import a library, by library
         "views/film",
         "teach",
     },
+    "mujoco_menagerie": {"environments/mujoco_model"},
     "torch": {"forward_model"},
     "lightning": {"forward_model"},
     "safetensors": {"forward_model"},

@@ -13,8 +13,8 @@ from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.process import Stopping, command
 from sgimd_torch.runs.read import movements_on_disk, read_run
 from sgimd_torch.runs.run import Life
-from sgimd_torch.runs.tasks.robots import toy_demonstrations
 from sgimd_torch.runs.tasks.taught import demonstrations_of
+from sgimd_torch.runs.tasks.toys import toy_demonstrations
 from sgimd_torch.spaces import stream
 
 FOUR = ("demonstrator-1", "demonstrator-2", "demonstrator-3", "mislabelling")

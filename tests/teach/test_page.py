@@ -44,6 +44,7 @@ def test_a_person_leads_the_arm_teaches_it_and_sees_what_changed(open_tab, rod):
     tab.tab.get_by_role("button", name="Stop").click()
     rod.until(lambda: rod.lesson is not None)
     lesson = rod.lesson
+    assert np.array_equal(rod.leading.q, rod.leading.arm.start)  # it went back by itself
 
     landing = tab.at([*lesson.demonstration.outcome, 0])
     before = tab.colours(landing, 60)
@@ -51,6 +52,7 @@ def test_a_person_leads_the_arm_teaches_it_and_sees_what_changed(open_tab, rod):
     tab.tab.get_by_text("goals within reach.").wait_for()
     tab.until_changed(landing, 60, before, 30, 0.3)
     assert rod.status.lessons == 1
+    tab.tab.get_by_text("1 lesson by hand").wait_for()
     assert np.array_equal(rod.taught.parts.learner.memory.thetas[5], lesson.theta_d)
     tab.tab.get_by_role("button", name="Let the learner go on").click()
     rod.until(lambda: rod.status.movements > 50)
@@ -79,7 +81,7 @@ def test_the_first_minute(open_tab, rod):
     """It waits for a lesson, says what one sees, and what was wrong with a recording; an old throw goes away."""
     tab = open_tab(rod)
     assert rod.status.movements == 5
-    tab.tab.get_by_text("The ground is the task space, x (m) and y (m)").wait_for()
+    tab.tab.get_by_text("The coloured map is the task space, x (m) and y (m)").wait_for()
     show = tab.tab.get_by_role("button", name="Show it to the learner")
     tab.tab.get_by_role("button", name="Record").click()
     rod.until(lambda: rod.leading.recording)
@@ -90,7 +92,7 @@ def test_the_first_minute(open_tab, rod):
     rod.until(lambda: rod.leading.recording)
     lead(tab, PATH[::4])
     tab.tab.get_by_role("button", name="Stop").click()
-    tab.tab.get_by_text("It lands at").wait_for()
+    tab.tab.get_by_text("Its outcome is").wait_for()
     assert show.is_enabled()
     tab.tab.get_by_role("button", name="Record").click()
     tab.tab.get_by_text("Nothing recorded yet.").wait_for()

@@ -101,8 +101,6 @@ def test_it_goes_on_where_it_was_stopped_with_or_without_a_person(taught, teache
     ("options", "lesson", "message"),
     [
         ({}, replace(SHOWN[0], trajectory=100 * SHOWN[0].trajectory), "first joint"),
-        ({"algorithm": "sagg-riac", "teacher": None}, SHOWN[0], "sagg-riac cannot be shown"),
-        ({"algorithm": "sgim-im", "teacher": None}, SHOWN[0], "sgim-im cannot be shown"),
         ({"movements": 30}, SHOWN[0], "--movements 60"),
     ],
 )
@@ -112,6 +110,14 @@ def test_what_cannot_be_shown_is_refused_and_nothing_happens(taught, options, le
         learning.show(lesson)
     assert (learning.status().movements, learning.status().lessons) == (30, 0)
     learning.close()
+
+
+@pytest.mark.parametrize("algorithm", ["sagg-riac", "sgim-im"])
+def test_a_learner_that_nobody_can_teach_by_hand_is_refused_before_anything_is_written(tmp_path, capsys, algorithm):
+    words = ["--environment", "planar-arm-7", "--algorithm", algorithm, "--out", str(tmp_path)]
+    assert command(main, words) == 2
+    assert f"{algorithm} cannot be taught by hand" in capsys.readouterr().err
+    assert not [*tmp_path.iterdir()]
 
 
 def test_a_task_without_anything_to_lead_says_why(capsys):

@@ -73,12 +73,14 @@ def test_many_goals_go_in_and_out_as_tables_whose_numbers_are_exact(path, lived,
         (["--goal", "0.3,0.4", "--context", "1"], "--context must have shape (..., 0)"),
         (["--goal", "0.3,0.4", "--trajectory", "joints.csv"], "no motor primitive that gives joints over time"),
         (["--goals", "bad.csv"], "bad.csv: row 2 is no goal of 2 numbers: 1,z"),
+        (["--goals", "first.csv"], "first.csv: row 1 is no goal of 2 numbers: 0.3,1_0"),
         (["--goals", "lost.csv"], "lost.csv cannot be read or written"),
     ],
 )
 def test_a_wrong_request_is_told(path, tmp_path, monkeypatch, capsys, words, said):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "bad.csv").write_text("0,1\n1,z\n")
+    (tmp_path / "first.csv").write_text("0.3,1_0\n")
     assert command(main, [str(path), *words]) == 2
     assert said in capsys.readouterr().err
 

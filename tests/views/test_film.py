@@ -12,7 +12,9 @@ from PIL import Image, ImageSequence
 
 from runs import ROOT
 from sgimd_torch.environments.fishing_rod import HOLD, FishingRod
+from sgimd_torch.environments.mujoco_robot import MujocoRobot
 from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.environments.sketch import Sketch
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.record import Record
 from sgimd_torch.runs import command_line
@@ -24,8 +26,10 @@ from sgimd_torch.spaces import Box, stream
 from sgimd_torch.views import check
 from sgimd_torch.views.film import command as film
 from sgimd_torch.views.film.camera import Camera
+from sgimd_torch.views.film.model_camera import viewing
 from sgimd_torch.views.film.panel import panel
 from sgimd_torch.views.film.reel import PAUSE, RATES, Shot, write_film
+from sgimd_torch.views.film.sketch import Sketchbook
 
 THETAS = stream(0, "film").random((100, 25))[40:]  # some reach the water before the line is let out
 RATE = RATES[".mp4"]
@@ -288,12 +292,13 @@ def test_a_recorded_movement_of_an_arm_ends_where_the_executed_one_does():
         theta = stream(0, "arm", k).random(5)
         sketch = arm.trace(context, theta, stream(1, "noise", k))
         np.testing.assert_array_equal(sketch.outcome, arm.execute(context, theta, stream(1, "noise", k)))
-        np.testing.assert_allclose(sketch.chains[-1, -1], sketch.outcome, atol=1e-12)
-        np.testing.assert_allclose(sketch.chains[:, 0], 0)
-        links = np.linalg.norm(np.diff(sketch.chains, axis=1), axis=2)
+        (chain,) = sketch.chains
+        np.testing.assert_allclose(chain[-1, -1], sketch.outcome, atol=1e-12)
+        np.testing.assert_allclose(chain[:, 0], 0)
+        links = np.linalg.norm(np.diff(chain, axis=1), axis=2)
         np.testing.assert_allclose(links, 0.2)  # of five links of an arm of 1 m, at every moment
-        np.testing.assert_allclose(sketch.chains[0, -1], [np.cos(0.3), np.sin(0.3)])  # straight, turned by the context
-        assert np.linalg.norm(np.diff(sketch.chains, axis=0), axis=2).max() < 0.6  # without a jump
+        np.testing.assert_allclose(chain[0, -1], [np.cos(0.3), np.sin(0.3)])  # straight, turned by the context
+        assert np.linalg.norm(np.diff(chain, axis=0), axis=2).max() < 0.6  # without a jump
     assert sketch.landed == pytest.approx(1.0)
 
 
@@ -309,6 +314,72 @@ def test_an_arm_is_filmed_without_opengl(own):
     assert np.argwhere(yellow)[:, 0].mean() < 240  # the ring
     assert np.abs(pictures[0] - pictures[-1]).max() > 100
     assert np.abs(pictures[-15] - pictures[-1]).mean() < 2  # it has arrived
+
+
+PUSHING = """<mujoco><option timestep=".005" integrator="implicitfast"/><default><joint damping="1"/></default>
+  <worldbody><geom type="plane" size="2 2 .1"/>{}
+    <body pos="0 0 .05"><joint name="turn" axis="0 0 1" range="-120 120"/>
+      <geom type="capsule" fromto="0 0 0 .3 0 0" size=".02"/></body>
+    <body name="puck" pos=".2 .2 .03"><freejoint/><geom type="cylinder" size=".04 .03"/></body></worldbody>
+  <actuator><position joint="turn" kp="20" kv="4"/></actuator></mujoco>"""
+PUCK = "--environment mujoco --environment.model push.xml --environment.outcome body:puck:xy"
+PUCK += " --environment.context body:puck:x:.1:.2,body:puck:y:.1:.2 --environment.low=-.5,-.5 --environment.high .6,.6"
+
+
+def test_a_robot_from_a_file_is_filmed_in_space_and_without_opengl_in_the_plane(own):
+    (own / "push.xml").write_text(PUSHING.format(""))
+    live(f"{PUCK} --algorithm random --movements 20 --evaluate-at [] --out runs")
+    rest = ["--goals", "-0.4,0.5", "--context", "0.2,0.1"]
+    frames = {}
+    for gl in ("egl", "bogus"):
+        process = filmed("runs/random/seed-000", gl, *rest, "--out", f"{gl}.mp4")
+        assert process.returncode == 0, process.stderr
+        assert ("drawn in the plane: MuJoCo finds no OpenGL" in process.stderr) == (gl == "bogus")
+        assert "Traceback" not in process.stderr
+        frames[gl], _ = decoded(own / f"{gl}.mp4", 480, 640 + 360)
+        red, green, blue = np.moveaxis(frames[gl][-1, 60:420, :640], -1, 0)
+        assert ((red > 150) & (green > 130) & (blue < 100)).sum() > 50  # the goal, yellow
+    assert len(frames["egl"]) == len(frames["bogus"])
+    assert np.abs(frames["egl"][0, :, :640] - frames["bogus"][0, :, :640]).mean() > 50
+    assert command(film.main, ["runs/random/seed-000", "--context", "0.5,0.1"]) == 2
+
+
+@pytest.mark.parametrize("own_camera", ["", "<camera name='far' pos='0 0 3' fovy='40'/>"])
+def test_the_camera_sees_all_of_the_task_space_and_the_arm(own, own_camera):
+    near = "<camera name='near' pos='0 0 .5'/>"
+    (own / "push.xml").write_text(PUSHING.format(near + own_camera))
+    robot = MujocoRobot("push.xml", outcome="body:puck:xy", low=(-0.5, -0.5), high=(0.6, 0.6))
+    data, scene = mujoco.MjData(robot.model), mujoco.MjvScene(robot.model, 100)
+    mujoco.mj_forward(robot.model, data)
+    points = np.array([[x, y, 0.03] for x in (-0.5, 0.6) for y in (-0.5, 0.6)])
+    seen = viewing(robot.model, data, points)
+    camera = seen if isinstance(seen, mujoco.MjvCamera) else mujoco.MjvCamera()
+    if own_camera:
+        assert seen == 1
+        camera.type, camera.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, seen
+    option, every = mujoco.MjvOption(), mujoco.mjtCatBit.mjCAT_ALL
+    mujoco.mjv_updateScene(robot.model, data, option, None, camera, every, scene)
+    eye = scene.camera[0]  # of the left eye, which MuJoCo itself computed
+    away = points - eye.pos
+    depth, up = away @ eye.forward, away @ eye.up
+    across = away @ np.cross(eye.forward, eye.up)
+    slope = eye.frustum_top / eye.frustum_near
+    assert (np.abs(up) < slope * depth).all()
+    assert (np.abs(across) < 640 / 480 * slope * depth).all()
+    if not own_camera:  # and it is no farther than it has to be
+        assert max((np.abs(up) / slope / depth).max(), (np.abs(across) / slope / depth * 480 / 640).max()) > 0.75
+
+
+def test_the_plane_shows_all_of_the_task_space_and_every_chain_but_objects_may_leave():
+    space = Box(np.array([-1.0, -2.0]), np.array([3.0, 2.0]))
+    arm, lost = np.zeros((3, 2, 2)), np.full((3, 1, 2), 50.0)
+    arm[:, 1] = [4, 0]
+    shot = Shot(Sketch(np.zeros(2), 0.1, [arm, lost]), np.zeros(2))
+    book = Sketchbook(space, [shot])
+    low, high = np.transpose([book._ax.get_xlim() for _ in [book.frame(shot, 0)]] + [book._ax.get_ylim()])
+    assert (low < [-1, -2]).all()
+    assert (high > [4, 2]).all()
+    assert (high < 10).all()
 
 
 @pytest.mark.parametrize(("word", "goal"), [("Slider", "0.4"), ("Slider3", "0.4,0.2,0.9")])

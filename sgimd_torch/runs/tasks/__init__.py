@@ -10,15 +10,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Final, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Final, Protocol, runtime_checkable
 
 import numpy as np
 
-from sgimd_torch.environments.protocol import Environment, FromFiles, Trace, Tracer, check_instance, traced
+from sgimd_torch.environments.protocol import Environment, FromFiles, check_instance
 from sgimd_torch.evaluation import Benchmark, load_benchmark
 from sgimd_torch.files import checksum
 from sgimd_torch.learner import Correspondence
 from sgimd_torch.spaces import Array, Demonstration
+
+if TYPE_CHECKING:
+    from sgimd_torch.environments.sketch import Trace, Tracer
 
 MOST_GOALS: Final = 500  # largest number of benchmark goals for a task that brings none
 
@@ -57,6 +60,8 @@ class Task:
     @property
     def picture(self) -> Tracer | None:
         """The method ``trace`` of a `Drawn` environment, with checks of its result; None for other environments."""
+        from sgimd_torch.environments.sketch import traced  # only films need it
+
         robot = self.environment
         return partial(traced, robot, robot.trace) if isinstance(robot, Drawn) else None
 

@@ -27,8 +27,8 @@ from sgimd_torch.views.film.reel import HEIGHT, WIDTH, Shot
 MOST_PAST: Final = 250  # largest number of past landings in a frame; 250 landings double the time of drawing a frame
 
 _Colour = tuple[float, float, float, float]
-_INK, _FLOAT, _GOAL, _PATH = (0.06, 0.06, 0.08, 1), (0.92, 0.24, 0.02, 1), (0.94, 0.89, 0.26, 1), (0.6, 0.28, 0.12, 1)
-_PAST, _RING = (0.92, 0.96, 1, 0.7), (0.85, 0.93, 0.97, 0.45)
+_INK, _FLOAT, GOAL, _PATH = (0.06, 0.06, 0.08, 1), (0.92, 0.24, 0.02, 1), (0.94, 0.89, 0.26, 1), (0.6, 0.28, 0.12, 1)
+PAST, _RING = (0.92, 0.96, 1, 0.7), (0.85, 0.93, 0.97, 0.45)
 
 
 class Camera:
@@ -48,14 +48,7 @@ class Camera:
         self._data = mujoco.MjData(self._model)
         self._tip = self._model.site("tip").id
         self._line = [self._model.body(f"line_{k:02}").id for k in range(2, 31)]
-        try:
-            self._renderer = mujoco.Renderer(self._model, HEIGHT, WIDTH)
-        # Each OpenGL library fails in a different way.
-        except (mujoco.FatalError, AttributeError, RuntimeError, ImportError) as error:
-            raise ImportError(
-                f"MuJoCo finds no OpenGL to draw with (MUJOCO_GL={os.environ.get('MUJOCO_GL', '')}: {error}); without "
-                "a display set MUJOCO_GL=egl and install libegl1 (Debian, Ubuntu), or MUJOCO_GL=osmesa and libosmesa6"
-            ) from error
+        self._renderer = renderer_of(self._model)
 
     def __enter__(self) -> Self:
         return self
@@ -77,17 +70,17 @@ class Camera:
         self._renderer.update_scene(self._data, camera="shore")
         scene, here = self._renderer.scene, recording.float_at(time)
         for radius in (0.5, 1.0):
-            _draw_chain(scene, _circle(np.zeros(2), radius), 0, _RING)
+            draw_chain(scene, _circle(np.zeros(2), radius), 0, _RING)
         for landing in shot.past[:: max(1, math.ceil(len(shot.past) / MOST_PAST))]:
-            _draw(scene, mujoco.mjtGeom.mjGEOM_BOX, (0.007, 0.007, 0.001), np.append(landing, 0.001), _PAST)
-        _draw_chain(scene, _circle(shot.goal, 0.06), 0.008, _GOAL)
-        _draw_chain(scene, [*(recording.float_at(t) for t in np.arange(0.0, time, 0.02)), here], 0, _PATH)
+            draw(scene, mujoco.mjtGeom.mjGEOM_BOX, (0.007, 0.007, 0.001), np.append(landing, 0.001), PAST)
+        draw_chain(scene, _circle(shot.goal, 0.06), 0.008, GOAL)
+        draw_chain(scene, [*(recording.float_at(t) for t in np.arange(0.0, time, 0.02)), here], 0, _PATH)
         loose = recording.let_out is not None and time > recording.let_out
         hinges = [] if loose else self._data.xpos[self._line]
-        _draw_chain(scene, [self._data.site_xpos[self._tip], *hinges, here], 0.003, _INK)
-        _draw(scene, mujoco.mjtGeom.mjGEOM_SPHERE, (0.026, 0, 0), here, _FLOAT).emission = 0.4
+        draw_chain(scene, [self._data.site_xpos[self._tip], *hinges, here], 0.003, _INK)
+        draw(scene, mujoco.mjtGeom.mjGEOM_SPHERE, (0.026, 0, 0), here, _FLOAT).emission = 0.4
         if time == recording.landed:
-            _draw_chain(scene, [np.append(shot.goal, 0.006), np.append(recording.outcome, 0.006)], 0.005, _GOAL)
+            draw_chain(scene, [np.append(shot.goal, 0.006), np.append(recording.outcome, 0.006)], 0.005, GOAL)
         return Image.fromarray(self._renderer.render())
 
     @staticmethod
@@ -95,6 +88,22 @@ class Camera:
         """The note "line let out" from the moment when the line is let out, "" before."""
         let_out = _trace(shot).let_out
         return "line let out" if let_out is not None and time > let_out else ""
+
+
+def renderer_of(model: mujoco.MjModel) -> mujoco.Renderer:
+    """A renderer of pictures of a model, in the size of a film.
+
+    Raises:
+        ImportError: OpenGL is not available in the form that the variable MUJOCO_GL names.
+    """
+    try:
+        return mujoco.Renderer(model, HEIGHT, WIDTH)
+    # Each OpenGL library fails in a different way.
+    except (mujoco.FatalError, AttributeError, RuntimeError, ImportError) as error:
+        raise ImportError(
+            f"MuJoCo finds no OpenGL to draw with (MUJOCO_GL={os.environ.get('MUJOCO_GL', '')}: {error}); without "
+            "a display set MUJOCO_GL=egl and install libegl1 (Debian, Ubuntu), or MUJOCO_GL=osmesa and libosmesa6"
+        ) from error
 
 
 def _trace(shot: Shot) -> RodTrace:
@@ -107,14 +116,14 @@ def _circle(centre: Array, radius: float) -> Array:
     return np.append(centre, 0.004) + radius * np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
 
 
-def _draw_chain(scene: mujoco.MjvScene, points: Sequence[Array] | Array, radius: float, colour: _Colour) -> None:
+def draw_chain(scene: mujoco.MjvScene, points: Sequence[Array] | Array, radius: float, colour: _Colour) -> None:
     """Join points by rods of a ``radius`` (m); a radius of 0 draws lines, which is faster."""
     kind, width = (mujoco.mjtGeom.mjGEOM_CAPSULE, radius) if radius else (mujoco.mjtGeom.mjGEOM_LINE, 2)  # pixels
     for start, stop in pairwise(points):
-        mujoco.mjv_connector(_draw(scene, kind, (width, 0, 0), start, colour), kind, width, start, stop)
+        mujoco.mjv_connector(draw(scene, kind, (width, 0, 0), start, colour), kind, width, start, stop)
 
 
-def _draw(scene: mujoco.MjvScene, kind: int, size: Sequence[float], place: Array, colour: _Colour) -> Any:
+def draw(scene: mujoco.MjvScene, kind: int, size: Sequence[float], place: Array, colour: _Colour) -> Any:
     """Add a geom to the scene; MuJoCo defines the meaning of ``size`` (m) for each ``kind``."""
     geom = scene.geoms[scene.ngeom]
     mujoco.mjv_initGeom(geom, kind, np.array(size), place, np.eye(3).ravel(), np.array(colour, np.float32))

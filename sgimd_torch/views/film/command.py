@@ -1,17 +1,19 @@
 """Film what a run has learnt: the robot executes the movements that the inverse model of the run infers for goals.
 
 The memory is rebuilt from the record. The robot executes the movement inferred for each goal once, with motor noise, in
-the middle of C. A yellow ring is the goal, dots are past outcomes, and a red cross is the outcome. A panel shows the
-benchmark goals, coloured by error, and the curve of the mean error.
+one context. Goals are yellow, dots are past outcomes, and lines are paths. A panel shows the benchmark goals, coloured
+by error, and the curve of the mean error.
 
-MuJoCo draws the fishing rod, with circles of radius 0.5 m and 1 m around its base. If the float is still in the air
-after the movement, the line is let out and the float falls, as the caption says. Planar arms, and your own environments
-with a method trace(context, theta, rng) -> Sketch, are drawn in the plane.
+MuJoCo draws robots from model files, with the border of T, and the fishing rod, with circles of radius 0.5 m and 1 m
+around its base. If the float is still in the air after the movement, the line is let out and the float falls, as the
+caption says. Planar arms, and your own environments with a method trace(context, theta, rng) -> Sketch, are drawn in
+the plane; so are robots from model files if there is no OpenGL.
 """
 
 from __future__ import annotations
 
 import argparse
+import importlib
 import os
 import re
 import sys
@@ -24,11 +26,11 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from sgimd_torch.environments.protocol import Sketch
+from sgimd_torch.environments.sketch import Sketch
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.figures.names import colour, label
 from sgimd_torch.runs.build import RunParts, build
-from sgimd_torch.runs.process import parser_of
+from sgimd_torch.runs.process import parser_of, say
 from sgimd_torch.runs.read import Run, config_of, read_run
 from sgimd_torch.spaces import Array, stream
 from sgimd_torch.strategies import Remember
@@ -66,7 +68,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         hint = "a goal is a place in T, such as 0.3,0.6"
         goals = np.stack([parts.environment.outcomes.check("--goals", goal, hint) for goal in options.goals])
     stages = _stages(run, options)
-    shots = _cast(run, parts, goals, stages)
+    contexts = parts.environment.contexts
+    middle = (contexts.low + contexts.high) / 2
+    context = contexts.check("--context", middle if options.context is None else options.context)
+    shots = _cast(run, parts, goals, context, stages)
     with _painter(parts.environment, shots) as painter:
         rate = RATES[options.out.suffix]
         n = sum(len(shot.moments(rate)) for shot in shots)
@@ -82,29 +87,37 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _parts(run: Run, *, trust: bool) -> RunParts:
-    """The parts of the run. The rod imports MuJoCo, and this import fails if OpenGL is not available."""
+    """The parts of the run. MuJoCo chooses OpenGL when it is imported; if the choice fails, it is imported without."""
     if sys.platform == "linux":
         os.environ.setdefault("MUJOCO_GL", "egl")  # works without a display
+    asked = dict(os.environ)
     try:
-        return build(config_of(run, trust=trust))
-    except (AttributeError, RuntimeError) as error:  # each OpenGL library fails in a different way
-        if "mujoco" in sys.modules:
-            raise
-        asked = os.environ.get("MUJOCO_GL")
-        raise ImportError(f"MUJOCO_GL={asked} does not work ({error}); set MUJOCO_GL=egl, or unset it") from error
+        importlib.import_module("mujoco")
+    except (AttributeError, RuntimeError, ImportError):  # each OpenGL library fails in a different way
+        os.environ["MUJOCO_GL"] = "disable"
+        importlib.import_module("mujoco")
+        os.environ.update(asked)
+    return build(config_of(run, trust=trust))
 
 
 def _painter(robot: Any, shots: Sequence[Shot]) -> AbstractContextManager[Painter]:
     """The painter for a robot and its shots."""
-    if isinstance(shots[0].recording, Sketch):
-        return nullcontext(Sketchbook(robot.outcomes, shots))
-    from sgimd_torch.views.film.camera import Camera  # only the rod needs OpenGL
+    sketched = isinstance(shots[0].recording, Sketch)
+    if not sketched or hasattr(shots[0].recording, "states"):
+        from sgimd_torch.views.film.camera import Camera  # only these need OpenGL
+        from sgimd_torch.views.film.model_camera import ModelCamera
 
-    return Camera(robot.model)
+        try:
+            return ModelCamera(robot, shots) if sketched else Camera(robot.model)
+        except ImportError as error:
+            if not sketched:
+                raise
+            say(f"drawn in the plane: {error}")
+    return nullcontext(Sketchbook(robot.outcomes, shots))
 
 
-def _cast(run: Run, parts: RunParts, goals: Array, stages: Sequence[int]) -> list[Shot]:
-    """The shots: the movement inferred for each goal at each stage, with equal motor noise at all stages.
+def _cast(run: Run, parts: RunParts, goals: Array, context: Array, stages: Sequence[int]) -> list[Shot]:
+    """The shots: the movement inferred for each goal in a context at each stage, with equal motor noise at all stages.
 
     A stage is a number of movements of the learner. The panel beside a shot shows the errors of the benchmark goals at
     this stage, and the curve of the mean error over all stages. If there is one stage, the curve has the evaluations of
@@ -113,7 +126,8 @@ def _cast(run: Run, parts: RunParts, goals: Array, stages: Sequence[int]) -> lis
     picture = parts.task.picture
     assert picture is not None
     robot, seed = parts.environment, run.config["seed"]
-    context = (robot.contexts.low + robot.contexts.high) / 2
+    names = robot.contexts.names or [f"context {k}" for k in range(robot.contexts.dim)]
+    seen = ", ".join(f"{name} {robot.contexts.amount(x)}" for name, x in zip(names, context, strict=True))
     who = label(run.config["name"] or run.config["algorithm"])
     shots, errors = list[Shot](), list[Array]()
     for before, movements in zip((0, *stages), stages, strict=False):
@@ -122,10 +136,10 @@ def _cast(run: Run, parts: RunParts, goals: Array, stages: Sequence[int]) -> lis
             raise ValueError(f"{run.path} has an empty memory after {movements} movements, so it infers no movement")
         past = run.outcomes[:movements]
         past = past[np.isfinite(past[:, 0])]
-        title = f"{who}, seed {seed}, after {movements} movements"
+        title = f"{who}, seed {seed}, after {movements} movements" + f"\n{seen}" * bool(seen)
         for k, goal in enumerate(goals):
             recording = picture(context, parts.answers["own"](context, goal).theta, stream(seed, "film", k))
-            shots.append(Shot(recording, goal, title, robot.outcomes.unit, past))
+            shots.append(Shot(recording, goal, context, title, robot.outcomes.unit, past))
         found = evaluate(
             parts.answers["own"], robot, parts.benchmark.goals, seed, movements, context=context, repeats=0
         )
@@ -170,6 +184,8 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument("run", type=Path, help="directory of a run: OUT/NAME/seed-003")
     goals = "points of T (default: six goals of the benchmark, or two if --after is given)"
     parser.add_argument("--goals", type="numbers", nargs="+", metavar="X,Y", help=goals)
+    where = "context of all movements (default: the middle of C)"
+    parser.add_argument("--context", type="numbers", metavar="X,Y", help=where)
     after = "numbers of movements after which to film all goals (default: all movements)"
     parser.add_argument("--after", type=int, nargs="+", metavar="N", help=after)
     parser.add_argument(

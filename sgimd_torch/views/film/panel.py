@@ -14,11 +14,11 @@ from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from sgimd_torch.figures.axes import limits, over_movements, rounded
+from sgimd_torch.figures.axes import limits, over_movements
 from sgimd_torch.figures.learning import misses
 from sgimd_torch.figures.save import STYLE
 from sgimd_torch.figures.sections import sections
-from sgimd_torch.spaces import Array, Box
+from sgimd_torch.spaces import Array, Box, rounded
 from sgimd_torch.views.film.reel import HEIGHT, Frame
 
 _DPI: Final = 100

@@ -21,7 +21,7 @@ from imageio_ffmpeg import get_ffmpeg_exe
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from sgimd_torch.environments.protocol import Trace
+from sgimd_torch.environments.sketch import Trace
 from sgimd_torch.files import replacing
 from sgimd_torch.spaces import Array
 
@@ -46,6 +46,7 @@ class Shot:
     Args:
         recording: trajectory of the movement.
         goal: ``(outcome_dim,)`` goal of the movement.
+        context: ``(context_dim,)`` context in which the movement is executed.
         title: text at the upper edge, "" for none.
         unit: unit of T.
         past: ``(n, outcome_dim)`` earlier outcomes to draw.
@@ -54,6 +55,7 @@ class Shot:
 
     recording: Trace
     goal: Array
+    context: Array = field(default_factory=lambda: np.empty(0))
     title: str = ""
     unit: str = ""
     past: Array = field(default_factory=lambda: np.empty((0, 2)))

@@ -1,8 +1,8 @@
-"""Films of robots in the plane: chains of links from a ``Sketch``, drawn without OpenGL.
+"""Films of robots in the plane: chains of links and objects from a ``Sketch``, drawn without OpenGL.
 
     write_film(Path("film.mp4"), shoot(Sketchbook(arm.outcomes, shots), shots))
-The goal is a ring, past outcomes are dots, the outcome is a cross, and a line is the path of the chain's end. The first
-two dimensions of an outcome are x and y of the picture; if an outcome has only one dimension, y is 0.
+The goal is a ring, past outcomes are dots, the outcome is a cross, and lines are the paths of the chains' ends. The
+first two dimensions of an outcome are x and y of the picture; if an outcome has only one dimension, y is 0.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.patches import Rectangle
 from PIL import Image
 
-from sgimd_torch.environments.protocol import Sketch
+from sgimd_torch.environments.sketch import Sketch
 from sgimd_torch.figures.axes import goal_rings
 from sgimd_torch.spaces import Array, Box
 from sgimd_torch.views.film.panel import blank, pixels
@@ -22,7 +22,7 @@ from sgimd_torch.views.film.reel import HEIGHT, WIDTH, Shot
 
 MARGINS: Final = (0.06, 0.11)  # margins as shares of the width and the height of the picture
 _PAPER, _FRAME, _LINK = "#f7f5f0", "#c9c4b8", "#2b3a4a"
-_PATH, _END, _PAST = "#e08a55", "#d1341f", "#9db4c8"
+_PATH, _END, _OBJECT, _PAST = "#e08a55", "#d1341f", "#2f7f6f", "#9db4c8"
 
 
 class Sketchbook:
@@ -30,13 +30,17 @@ class Sketchbook:
 
     Args:
         space: T, whose border is drawn.
-        shots: all shots of the film; the scale fits their movements, so parts of T may lie outside the picture.
+        shots: all shots of the film. The scale fits T, their first chains and their chains of links; other objects may
+            leave the picture.
     """
 
     def __init__(self, space: Box, shots: Sequence[Shot]) -> None:
         self._space = space
-        seen = [_chains(shot).reshape(-1, 2) for shot in shots]
-        seen += [in_picture(space.clip([*shot.past, shot.goal, shot.recording.outcome])) for shot in shots]
+        chains = [
+            chain for shot in shots for k, chain in enumerate(_sketch(shot).chains) if k == 0 or chain.shape[1] > 1
+        ]
+        seen = [chain.reshape(-1, 2) for chain in chains]
+        seen.append(in_picture(np.stack([space.low, space.high])))
         low, high = (end(np.concatenate(seen), axis=0) for end in (np.min, np.max))
         room = np.array([WIDTH, HEIGHT]) * (1 - 2 * np.array(MARGINS))
         half = np.array([WIDTH, HEIGHT]) / (room / np.maximum(high - low, 1e-9)).min() / 2
@@ -46,9 +50,8 @@ class Sketchbook:
 
     def frame(self, shot: Shot, time: float) -> Image.Image:
         """The robot at ``time`` (s); after the end of the movement, the last posture and the outcome."""
-        sketch, chains, ax = shot.recording, _chains(shot), self._ax
-        assert isinstance(sketch, Sketch)
-        chain = chains[: min(round(time / sketch.step), len(chains) - 1) + 1]
+        sketch, ax = _sketch(shot), self._ax
+        last = round(min(time, sketch.landed) / sketch.step)
         ax.clear()
         ax.set_axis_off()
         ax.set(xlim=(self._low[0], self._high[0]), ylim=(self._low[1], self._high[1]))
@@ -56,9 +59,11 @@ class Sketchbook:
             ax.add_patch(Rectangle(self._space.low[:2], *self._space.sides[:2], fill=False, edgecolor=_FRAME))  # type: ignore[arg-type]
         ax.plot(*in_picture(shot.past).T, "o", color=_PAST, ms=2, mec="none")
         goal_rings(ax, in_picture(shot.goal[None]), 14)
-        ax.plot(*chain[:, -1].T, color=_PATH, lw=1.5)
-        ax.plot(*chain[-1].T, "o-", color=_LINK, mfc="white", lw=3.5, ms=4)
-        ax.plot(*chain[-1, -1:].T, "o", color=_END, ms=7)
+        for chain in sketch.chains:
+            ax.plot(*chain[: last + 1, -1].T, color=_PATH, lw=1.5)
+        for chain in sketch.chains:
+            ax.plot(*chain[last].T, "o-", color=_LINK, mfc="white", lw=3.5, ms=4)
+            ax.plot(*chain[last, -1:].T, "o", color=_OBJECT if chain.shape[1] == 1 else _END, ms=7)
         if time >= sketch.landed:
             ax.plot(*in_picture(sketch.outcome[None]).T, "x", color=_END, ms=12, mew=2)
         return Image.fromarray(pixels(self._figure))
@@ -73,6 +78,6 @@ def in_picture(points: Array) -> Array:
     return points[:, :2] if points.shape[1] > 1 else np.column_stack([points, np.zeros(len(points))])
 
 
-def _chains(shot: Shot) -> Array:
+def _sketch(shot: Shot) -> Sketch:
     assert isinstance(shot.recording, Sketch)
-    return shot.recording.chains
+    return shot.recording

@@ -17,12 +17,12 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sgimd_torch.figures.axes import LEGEND, alike, limits, over_movements, rounded
+from sgimd_torch.figures.axes import LEGEND, alike, limits, over_movements
 from sgimd_torch.figures.learning import COLOURS, interest_map, landing_points, map_after
 from sgimd_torch.figures.learning import misses as draw_misses
 from sgimd_torch.figures.sections import Section, of_regions, sections
 from sgimd_torch.runs.read import Run
-from sgimd_torch.spaces import Array, Box
+from sgimd_torch.spaces import Array, Box, rounded
 from sgimd_torch.views.statistics import interquartile_mean
 from sgimd_torch.views.variants import Variant
 

@@ -1,0 +1,193 @@
+"""Robots made at random, on which no default was chosen: how well `practice` learns them, beside random movements.
+
+    experiments/random_robots.py --robots 0 36 --first 0 30 --out random.jsonl    # lives; made ones are kept
+    experiments/random_robots.py --first 0 30 --out random.jsonl --table          # the table of all lives made
+
+Nine families: planar and spatial chains, poses (which fill a thin part of their box), smooth and rugged maps, throws,
+maps that do nothing in half of Pi, contexts, periodic parameters. Units go from mm to km. Noise is absent, even,
+grows with the movement, or is one gross error in 33 movements.
+
+Numbers 0 to 199 are for development. Each error is the mean distance between goals and what the answers do without
+noise, divided by that of random movements, answered by the better of `process` and the nearest exemplar.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sgimd_torch.algorithms.paper import random_exploration
+from sgimd_torch.algorithms.practice import practice
+from sgimd_torch.explore.returning import Returning
+from sgimd_torch.inverses.nearest import NearestNeighbour
+from sgimd_torch.learner import Learner
+from sgimd_torch.parts import Inverse
+from sgimd_torch.session import run
+from sgimd_torch.spaces import Array, Box
+
+FAMILIES: Final = ("chain", "spatial", "pose", "smooth", "rugged", "throw", "idle", "context", "phases")
+NOISES: Final = ("none", "even", "speed", "gross")
+COUNTS: Final = (50, 100, 250, 500, 1000)  # movements at which a learner is evaluated
+HARMFUL: Final = 1.02  # errors above this many times those of random movements count as harm
+RANDOM: Final = "random"
+
+
+class RandomRobot:
+    """Robot with this ``number``; ``effect`` is the outcome without noise, ``goals`` are goals that it can reach."""
+
+    def __init__(self, number: int) -> None:
+        rng = np.random.default_rng([number, 2026])
+        self.family, self.noise = FAMILIES[number % len(FAMILIES)], NOISES[int(rng.integers(len(NOISES)))]
+        dim = int(rng.integers(3, 31))
+        self._lengths, self._limits = rng.dirichlet(np.ones(dim) * 4), rng.uniform(0.4, 2.2, dim)
+        self._axes = rng.normal(size=(dim, 3))
+        outcome_dims = {"chain": 2, "spatial": 3, "pose": int(rng.integers(4, 7))}
+        self._outcome_dim = outcome_dims.get(self.family, int(rng.integers(1, 4)))
+        context_dim = int(rng.integers(1, 3)) if self.family == "context" else 0
+        inputs = dim * (2 if self.family == "phases" else 1) + context_dim
+        scales = rng.normal(size=(inputs, 40)) * rng.lognormal(0, 0.6, (inputs, 1))
+        self._first = scales * rng.uniform(0.8, 2.5) / np.sqrt(inputs)
+        self._phase = rng.uniform(-np.pi, np.pi, 40)
+        self._second = rng.normal(size=(40, 40)) * 1.6 / np.sqrt(40)
+        self._last = rng.normal(size=(40, max(self._outcome_dim, 6))) / np.sqrt(40)
+        self._gate = rng.normal(size=dim)
+        self.contexts, self.policies, self._unit = Box.cube(-1, 1, context_dim), Box.cube(0, 1, dim), 1.0
+        thetas = rng.uniform(size=(6000, dim))
+        half = len(thetas) // 2  # the other half varies a few postures, as uniform movements leave out what is rare
+        centres = thetas[rng.integers(half, size=half) // 200 * 200]
+        thetas[half:] = np.clip(centres + rng.normal(0, 0.12, (half, dim)), 0, 1)
+        contexts = rng.uniform(-1, 1, (6000, context_dim))
+        effects = np.array([self.effect(c, t) for c, t in zip(contexts, thetas, strict=True)])
+        self._unit = float(10.0 ** rng.integers(-3, 4) / effects.std(axis=0).mean())
+        effects *= self._unit
+        low, high = effects.min(axis=0), effects.max(axis=0)
+        margin = (high - low) * rng.uniform(0, 0.4)
+        self.outcomes, self.rest = Box(low - margin, high + margin), effects.mean(axis=0)
+        sd = effects.std(axis=0).mean()
+        self.outcome_noise = 0.0 if self.noise == "none" else float(rng.choice([0.005, 0.02, 0.05]) * sd)
+        tiles = np.floor((effects - low) / (high - low) * {1: 60, 2: 10, 3: 5}.get(self._outcome_dim, 3))
+        order = rng.permutation(len(tiles))
+        _, first = np.unique(tiles[order], axis=0, return_index=True)
+        chosen = order[rng.permutation(first)[:100]]
+        self.goals, self.goal_contexts = effects[chosen], contexts[chosen]
+
+    def effect(self, context: ArrayLike, theta: ArrayLike) -> Array:
+        """Outcome ``(outcome_dim,)`` of a movement, without noise."""
+        x = 2 * np.asarray(theta, dtype=np.float64) - 1
+        if self.family == "chain":
+            angles = np.cumsum(x * self._limits)
+            found = np.array([self._lengths @ np.cos(angles), self._lengths @ np.sin(angles)])
+        elif self.family in ("spatial", "pose"):
+            found = self._pose(x)[: self._outcome_dim]
+        else:
+            turns = np.pi * (x + 1)
+            inputs = np.concatenate((np.cos(turns), np.sin(turns))) if self.family == "phases" else x
+            hidden = np.sin(np.concatenate((inputs, np.asarray(context))) @ self._first + self._phase)
+            if self.family == "rugged":
+                hidden = np.tanh(hidden @ self._second)
+            found = (hidden @ self._last)[: self._outcome_dim]
+            push = float(x @ self._gate / np.linalg.norm(self._gate))
+            if self.family == "throw":
+                found = found * (1 + abs(push)) ** 2
+            if self.family == "idle":
+                found = found * max(0.0, math.tanh(3 * push))
+        scaled: Array = found * self._unit
+        return scaled
+
+    def _pose(self, x: Array) -> Array:
+        """Position and orientation of the end of a chain in space."""
+        turn, place = np.eye(3), np.zeros(3)
+        for angle, axis, length in zip(x * self._limits, self._axes, self._lengths, strict=True):
+            k = axis / np.linalg.norm(axis)
+            cross = np.array([[0, -k[2], k[1]], [k[2], 0, -k[0]], [-k[1], k[0], 0]])
+            turn = turn @ (np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross)
+            place = place + turn @ np.array([length, 0, 0])
+        return np.concatenate((place, turn[:, 0] * 0.5))
+
+    def observe(self, rng: np.random.Generator) -> Array:
+        """A context, uniform in C."""
+        return self.contexts.sample(rng)
+
+    def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
+        """Outcome of a movement, with noise."""
+        found, sd = self.effect(context, theta), self.outcome_noise
+        if self.noise == "speed":
+            sd *= 2 * float(np.abs(2 * np.asarray(theta) - 1).mean())
+        if self.noise == "gross" and rng.random() < 0.03:
+            sd *= 20
+        return found + (rng.normal(0, sd, self._outcome_dim) if sd else 0.0)
+
+    def error(self, inverse: Inverse) -> float:
+        """Mean distance between goals and the effects of the answers, relative to the spread of the goals."""
+        asked = list(zip(self.goal_contexts, self.goals, strict=True))
+        missed = [np.linalg.norm(self.effect(c, inverse(c, g).theta) - g) for c, g in asked]
+        return float(np.mean(missed) / np.linalg.norm(self.goals - self.goals.mean(axis=0), axis=1).mean())
+
+
+def errors(robot: RandomRobot, learner: Learner, seed: int, also: Inverse | None = None) -> list[float]:
+    """Errors after each of `COUNTS` movements; the smaller one if ``also`` answers."""
+    found = []
+    for episode in run(learner, robot, seed, movements=COUNTS[-1]):
+        if episode.index + 1 in COUNTS:
+            found.append(min(robot.error(each) for each in (learner.inverse, also) if each is not None))
+    return found
+
+
+def life(number: int, name: str) -> list[float]:
+    """Errors of a learner on the robot with this ``number``; ``name`` is "random" or a number of first movements."""
+    robot = RandomRobot(number)
+    if name == RANDOM:
+        learner = random_exploration(robot, number)
+        return errors(robot, learner, number, NearestNeighbour(learner.problem))
+    return errors(robot, practice(robot, number, explore=partial(Returning, first=int(name))), number)
+
+
+def table(lives: dict[tuple[int, str], list[float]], names: list[str]) -> str:
+    """Table in Markdown: harmful lives, worst life and geometric mean of each learner at each count."""
+    numbers = sorted(n for n, name in lives if name == RANDOM and all((n, each) in lives for each in names))
+    lines = [f"| {len(numbers)} robots | {' | '.join(map(str, COUNTS))} |", "|---" * (1 + len(COUNTS)) + "|"]
+    for name in names:
+        ratios = np.array([np.divide(lives[n, name], lives[n, RANDOM]) for n in numbers])
+        for what, row, form in (
+            (f"worse than {HARMFUL}", (ratios > HARMFUL).sum(axis=0), "d"),
+            ("worst", ratios.max(axis=0), ".1f"),
+            ("geometric mean", np.exp(np.log(ratios).mean(axis=0)), ".2f"),
+        ):
+            lines.append(f"| first {name}: {what} | {' | '.join(format(each, form) for each in row)} |")
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Make the missing lives, or print the table of the lives that were made."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    numbers = "first number of a robot, and the number after the last (default: 0 36)"
+    parser.add_argument("--robots", nargs=2, type=int, default=[0, 36], help=numbers)
+    parser.add_argument("--first", nargs="+", default=["0"], help="numbers of uniform first movements (default: 0)")
+    parser.add_argument("--out", type=Path, default=Path("random.jsonl"), help="file of all lives, a line each")
+    parser.add_argument("--table", action="store_true", help="print the table instead of making lives")
+    options = parser.parse_args()
+    rows: list[dict[str, Any]] = []
+    if options.out.exists():
+        rows = [json.loads(line) for line in options.out.read_text().splitlines()]
+    lives = {(row["robot"], row["learner"]): row["errors"] for row in rows}
+    if options.table:
+        print(table(lives, options.first))
+        return
+    for number in range(*options.robots):
+        for name in (RANDOM, *options.first):
+            if (number, name) not in lives:
+                row = {"robot": number, "learner": name, "errors": life(number, name)}
+                with options.out.open("a") as file:
+                    file.write(json.dumps(row) + "\n")
+                print(number, name, *(f"{each:.4f}" for each in row["errors"]), flush=True)
+
+
+if __name__ == "__main__":
+    main()

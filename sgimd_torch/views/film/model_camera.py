@@ -1,0 +1,136 @@
+"""Films of robots from model files: MuJoCo draws robot and objects, with the goal, T and the path between them.
+
+    with ModelCamera(robot, shots) as camera: write_film(Path("film.mp4"), shoot(camera, shots))
+The model's own camera is used if it is fixed to the world and sees all of T. Else a camera is placed where it does.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Sequence
+from itertools import combinations, product
+from typing import Final, Self
+
+import mujoco
+import numpy as np
+from PIL import Image
+
+from sgimd_torch.environments.mujoco_robot import Filmed, MujocoRobot
+from sgimd_torch.spaces import Array
+from sgimd_torch.views.film.camera import GOAL, MOST_PAST, PAST, draw, draw_chain, renderer_of
+from sgimd_torch.views.film.reel import HEIGHT, WIDTH, Shot
+
+FILLED: Final = 0.8  # share of the picture, in height and width, that shows robot and T
+_BORDER, _PATH, _END = (0.2, 0.5, 0.6, 1), (0.88, 0.54, 0.33, 1), (0.82, 0.2, 0.12, 1)
+_BALL: Final = mujoco.mjtGeom.mjGEOM_SPHERE
+
+
+class ModelCamera:
+    """A `Painter` and context manager that draws shots of a robot from a model file, without a window.
+
+    Args:
+        robot: robot of the shots.
+        shots: all shots of the film; one camera sees them all.
+
+    Raises:
+        ImportError: OpenGL is not available in the form that the variable MUJOCO_GL names.
+    """
+
+    def __init__(self, robot: MujocoRobot, shots: Sequence[Shot]) -> None:
+        self._robot, self._model = robot, copy.copy(robot.model)
+        size = self._model.vis.global_  # a model may ask for smaller pictures
+        size.offwidth, size.offheight = max(WIDTH, size.offwidth), max(HEIGHT, size.offheight)
+        self._data = mujoco.MjData(self._model)
+        if not self._model.nlight:
+            light = self._model.vis.headlight
+            light.ambient[:], light.diffuse[:] = 0.4, 0.6
+        self._renderer = renderer_of(self._model)
+        for effect in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):  # three times slower
+            self._renderer.scene.flags[effect] = False
+        corners = np.concatenate([_edges(robot, shot).reshape(-1, 3) for shot in shots])
+        arm = [self._at(state).xpos[robot.bodies] for shot in shots for state in _filmed(shot).states[::5]]
+        seen = np.concatenate([corners, *arm])
+        self._camera = viewing(self._model, self._data, seen)
+        self._far = float(np.ptp(seen, axis=0).max())
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._renderer.close()
+
+    def frame(self, shot: Shot, time: float) -> Image.Image:
+        """The scene at ``time`` (s); after the end of the movement, the last state and the outcome.
+
+        The picture shows robot and objects, the border of T, the goal, past outcomes, and the path of each measured
+        place.
+        """
+        recording, start = _filmed(shot), self._robot.start_in(shot.context)
+        row = min(round(time / recording.step), len(recording.states) - 1)
+        self._renderer.update_scene(self._at(recording.states[row]), camera=self._camera)
+        scene, size = self._renderer.scene, 0.012 * self._far
+        for edge in _edges(self._robot, shot):
+            draw_chain(scene, edge, 0, _BORDER)
+        for place in self._robot.located(shot.past[:: max(1, math.ceil(len(shot.past) / MOST_PAST))], start).reshape(
+            -1, 3
+        ):
+            draw(scene, _BALL, (size / 3, 0, 0), place, PAST)
+        for k, goal in enumerate(self._robot.located(shot.goal[None], start)[0]):
+            path = recording.path[: row + 1, k]
+            draw_chain(scene, path, 0, _PATH)
+            draw(scene, _BALL, (1.6 * size, 0, 0), goal, (*GOAL[:3], 0.6)).emission = 0.4
+            draw(scene, _BALL, (0.8 * size, 0, 0), path[-1], _END).emission = 0.4
+            if time >= recording.landed:
+                draw_chain(scene, [goal, path[-1]], 0.4 * size, GOAL)
+        return Image.fromarray(self._renderer.render())
+
+    @staticmethod
+    def note(shot: Shot, time: float) -> str:
+        """Always ""."""
+        return ""
+
+    def _at(self, state: Array) -> mujoco.MjData:
+        mujoco.mj_setState(self._model, self._data, state, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+        mujoco.mj_forward(self._model, self._data)
+        return self._data
+
+
+def viewing(model: mujoco.MjModel, data: mujoco.MjData, points: Array) -> int | mujoco.MjvCamera:
+    """A camera that sees ``points`` ``(n, 3)`` m: the first camera of the model that is fixed to the world and does.
+
+    If there is none, it is the nearest camera in the direction in which MuJoCo's viewer first looks at the model.
+    """
+    for k in np.flatnonzero(model.cam_bodyid == 0).tolist():
+        x, y, z = ((points - data.cam_xpos[k]) @ data.cam_xmat[k].reshape(3, 3)).T
+        reach = -z * math.tan(math.radians(model.cam_fovy[k]) / 2)  # a camera looks along its -z
+        if ((np.abs(y) < reach) & (np.abs(x) < WIDTH / HEIGHT * reach)).all():
+            return int(k)
+    camera = mujoco.MjvCamera()
+    mujoco.mjv_defaultFreeCamera(model, camera)
+    turn, tilt = math.radians(camera.azimuth), math.radians(camera.elevation)
+    ahead = np.array([math.cos(tilt) * math.cos(turn), math.cos(tilt) * math.sin(turn), math.sin(tilt)])
+    right = np.array([math.sin(turn), -math.cos(turn), 0.0])
+    camera.lookat[:] = (points.min(axis=0) + points.max(axis=0)) / 2
+    away = points - camera.lookat
+    across, along = np.abs(away @ right) * HEIGHT / WIDTH, np.abs(away @ np.cross(right, ahead))
+    slope = FILLED * math.tan(math.radians(model.vis.global_.fovy) / 2)
+    camera.distance = float((np.maximum(across, along) / slope - away @ ahead).max())
+    return camera
+
+
+def _edges(robot: MujocoRobot, shot: Shot) -> Array:
+    """``(n_edges, 2, 3)`` m, the edges of T in the world, for each measured place."""
+    corners = np.array(list(product(*zip(robot.outcomes.low, robot.outcomes.high, strict=True))))
+    places, found = robot.located(corners, robot.start_in(shot.context)), dict[bytes, Array]()
+    for one, other in combinations(range(len(corners)), 2):
+        if (corners[one] != corners[other]).sum() == 1:
+            for edge in places[[one, other]].swapaxes(0, 1):
+                if not np.array_equal(*edge):
+                    found[edge.tobytes()] = edge
+    return np.array([*found.values()]).reshape(-1, 2, 3)
+
+
+def _filmed(shot: Shot) -> Filmed:
+    assert isinstance(shot.recording, Filmed)
+    return shot.recording
