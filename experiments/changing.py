@@ -19,6 +19,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from random_robots import RandomRobot
 from sgimd_torch.algorithms.paper import sagg_riac
 from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.catalogue import load_word
@@ -103,18 +104,9 @@ def error(learner: Learner, world: Environment, goals: Array) -> float:
     return round(evaluate(learner.inverse, world, goals, 1, step=learner.movements, repeats=0).mean_error, 5)
 
 
-def unchanged(task: str, seed: int, algorithm: str, robots: Path) -> dict[str, Any]:
+def unchanged(task: str, seed: int, algorithm: str) -> dict[str, Any]:
     """Alarms in 2000 movements of a robot that does not change; ``task`` may be the number of a random robot."""
-    if task.isdigit():
-        import sys
-
-        sys.path.append(str(robots.parent))
-        from random_robots import robot as random_robot  # type: ignore[import-not-found]
-
-        world = random_robot(int(task))
-    else:
-        made = load_word("environment", task)()
-        world = made if not hasattr(made, "environment") else made.environment
+    world: Environment = RandomRobot(int(task)) if task.isdigit() else load_word("environment", task)().environment
     learner = ALGORITHMS[algorithm](world, seed)
     for _ in run(learner, world, seed, movements=2000):
         pass
@@ -130,7 +122,6 @@ def main() -> None:
     parser.add_argument("--algorithms", nargs="+", default=["practice"], choices=ALGORITHMS)
     parser.add_argument("--before", type=int, default=1000, help="movements before the change")
     parser.add_argument("--unchanged", action="store_true", help="count false alarms instead")
-    parser.add_argument("--robots", type=Path, help="file random_robots.py; --tasks are then its numbers")
     parser.add_argument("--out", type=Path, default=Path("changing.jsonl"))
     options = parser.parse_args()
     known = (
@@ -141,7 +132,7 @@ def main() -> None:
     lives: dict[tuple[Any, ...], Callable[[], dict[str, Any]]] = {}
     for task, seed, algorithm in product(options.tasks, options.seeds, options.algorithms):
         if options.unchanged:
-            lives[task, seed, algorithm] = partial(unchanged, task, seed, algorithm, options.robots)
+            lives[task, seed, algorithm] = partial(unchanged, task, seed, algorithm)
             continue
         for change, learner in product(options.changes, options.learners):
             key = task, change, seed, learner, algorithm, options.before
