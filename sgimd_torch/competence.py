@@ -39,7 +39,10 @@ def performance(goal: Array, outcome: Array, rest: Array, d_min: float) -> Array
 class Competence(Judge):
     """Competence by the best outcome ever remembered, as in the paper.
 
-    This is gamma of eq. (2), over the whole memory. In one context it never falls.
+    This is gamma of eq. (2), over the whole memory. In one context it never falls while the robot stays the same.
+
+    Deviation: when the robot has changed, memory keeps only what still holds (`sgimd_torch.changes`), so competence
+    falls again where nothing reaches the goal any more.
 
     Deviation: the paper prints the minimum over memory, but J is negative, so the best J is the maximum, the J of the
     nearest outcome. Deviation: eq. (2) demands an equal context, but contexts drawn from a continuum never recur; the

@@ -15,6 +15,7 @@ from typing import Any
 
 from sgimd_torch.algorithms import MakeInverse
 from sgimd_torch.catalogue.options import hands_on
+from sgimd_torch.changes import watched
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.inverses.local_process import LocalProcess
@@ -79,6 +80,7 @@ def sagg_riac(
     *,
     inverse: MakeInverse = LocalProcess,
     memory: Memory | None = None,
+    prior: Memory | None = None,
     **parts: Any,
 ) -> Learner:
     """SAGG-RIAC: goal babbling without a teacher.
@@ -88,10 +90,15 @@ def sagg_riac(
         seed: number from which all random streams of the learner come.
         inverse: inverse model; searches begin at its answer.
         memory: exemplars to start from; None: the memory starts empty.
+        prior: exemplars of another robot, such as a simulator, which count as far as they hold; None: no exemplars.
         parts: parts and options of `GoalBabbling`.
     """
-    problem = Problem(environment, seed, memory, inverse=inverse)
-    return Learner(problem, GoalBabbling(problem, **parts))
+
+    def begin(seed: int, memory: Memory | None) -> Learner:
+        problem = Problem(environment, seed, memory, inverse=inverse)
+        return Learner(problem, GoalBabbling(problem, **parts))
+
+    return watched(begin, seed, memory, prior)
 
 
 @hands_on(GoalBabbling, goals=InterestMap, search=NelderMead)
@@ -103,6 +110,7 @@ def sgim_d(
     social: Callable[[Problem], Social] = Imitate,
     inverse: MakeInverse = LocalProcess,
     memory: Memory | None = None,
+    prior: Memory | None = None,
     **parts: Any,
 ) -> Learner:
     """SGIM-D: goal babbling; after each demonstration a short imitation.
@@ -114,8 +122,13 @@ def sgim_d(
         social: social strategy, which uses the demonstrations.
         inverse: inverse model; searches begin at its answer.
         memory: exemplars to start from; None: the memory starts empty.
+        prior: exemplars of another robot, such as a simulator, which count as far as they hold; None: no exemplars.
         parts: parts and options of `GoalBabbling`.
     """
-    problem = Problem(environment, seed, memory, inverse=inverse)
-    problem.autonomous = GoalBabbling(problem, **parts)
-    return Learner(problem, problem.autonomous, social=Social.of(social, problem), correspondence=correspondence)
+
+    def begin(seed: int, memory: Memory | None) -> Learner:
+        problem = Problem(environment, seed, memory, inverse=inverse)
+        problem.autonomous = GoalBabbling(problem, **parts)
+        return Learner(problem, problem.autonomous, social=Social.of(social, problem), correspondence=correspondence)
+
+    return watched(begin, seed, memory, prior)

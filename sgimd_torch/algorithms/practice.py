@@ -13,6 +13,7 @@ from typing import Any, Final
 
 from sgimd_torch.algorithms import MakeInverse
 from sgimd_torch.catalogue.options import hands_on
+from sgimd_torch.changes import watched
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.explore.returning import Returning
 from sgimd_torch.goals.within_reach import WithinReach
@@ -41,11 +42,16 @@ def practice(
     *,
     inverse: MakeInverse = AmongEffects,
     memory: Memory | None = None,
+    prior: Memory | None = None,
     **parts: Any,
 ) -> Learner:
     """Practice: one movement for each goal within reach, by a local Gaussian process; no teacher."""
-    problem = Problem(environment, seed, memory, inverse=inverse)
-    return Learner(problem, GoalBabbling(problem, **parts))
+
+    def begin(seed: int, memory: Memory | None) -> Learner:
+        problem = Problem(environment, seed, memory, inverse=inverse)
+        return Learner(problem, GoalBabbling(problem, **parts))
+
+    return watched(begin, seed, memory, prior)
 
 
 @hands_on(GoalBabbling, **PRACTICE)
@@ -57,12 +63,17 @@ def practice_taught(
     social: Callable[[Problem], Social] = ONCE,
     inverse: MakeInverse = AmongEffects,
     memory: Memory | None = None,
+    prior: Memory | None = None,
     **parts: Any,
 ) -> Learner:
     """Practice, one movement for each goal within reach; executes each demonstration once, exactly.
 
     It learns most when all demonstrations come at the start.
     """
-    problem = Problem(environment, seed, memory, inverse=inverse)
-    problem.autonomous = GoalBabbling(problem, **parts)
-    return Learner(problem, problem.autonomous, social=Social.of(social, problem), correspondence=correspondence)
+
+    def begin(seed: int, memory: Memory | None) -> Learner:
+        problem = Problem(environment, seed, memory, inverse=inverse)
+        problem.autonomous = GoalBabbling(problem, **parts)
+        return Learner(problem, problem.autonomous, social=Social.of(social, problem), correspondence=correspondence)
+
+    return watched(begin, seed, memory, prior)

@@ -48,7 +48,7 @@ class BoardListener(EventFile):
         self._space: Box = parts.environment.outcomes
         self._benchmark: Benchmark = parts.benchmark
         self._behaviour = Behaviour(parts.learner.problem.tolerance, parts.config.at_once)
-        self._movements = self._drawn_at = 0
+        self._movements = self._drawn_at = self._changes = 0
         self._explained: set[str] = set()
         # The result on TensorBoard's page of hyperparameters.
         result = "error/mean" if parts.config.evaluations else "goals/missed_by"
@@ -65,6 +65,9 @@ class BoardListener(EventFile):
             if not replayed:
                 self._scalars({f"time/{name.removeprefix('seconds_')}": s for name, s in self._seconds().items()})
         self._scalars(self._curves())
+        for change in self._learner.changes[self._changes :]:
+            self.add(self._movements, summary.text("about/changes", str(change)))
+        self._changes = len(self._learner.changes)
 
     def evaluated(self, movements: int, found: Mapping[str, Evaluation]) -> None:
         """Show an evaluation; of inverse models other than the run's own, show only the mean error.

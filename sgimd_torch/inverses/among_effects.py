@@ -21,25 +21,28 @@ class AmongEffects(Inverse):
 
     Args:
         problem: problem to learn.
+
+    Attributes:
+        of_all: process fitted to all movements.
     """
 
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)
         self._effects = Effects(problem.memory, problem.outcome_noise)
-        self._all = self._among = LocalProcess(problem)
+        self.of_all = self._among = LocalProcess(problem)
 
     def __call__(self, context: Array, goal: Array) -> Estimate:
         """The answer, and the exemplars of the nearest outcomes, nearest first."""
         acted = self.effects()
         if acted is None or not len(acted):
-            return self._all(context, goal)
+            return self.of_all(context, goal)
         if self._among.memory is not acted:
             self._among = LocalProcess(self.problem.over(acted))
         return self._among(context, goal)
 
     def predict(self, context: Array, theta: Array) -> Array | None:
         """Prediction of `LocalProcess`, fitted to all movements."""
-        return self._all.predict(context, theta)
+        return self.of_all.predict(context, theta)
 
     def effects(self) -> Memory | None:
         """Exemplars with an effect, see `Effects`."""

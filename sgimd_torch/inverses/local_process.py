@@ -9,7 +9,7 @@ inflated. If no candidate is clearly better, the answer is the nearest exemplar.
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -27,6 +27,14 @@ _GROUPS, _GROUP = 8, 60  # number of groups of neighbours that determine the ker
 _NEAR: Final = 20  # exemplars with outcomes nearest to the goal, on which the surprise of the process is measured
 _LEARNT: Final = 100  # exemplars to which the process is fitted, the `_NEAR` ones among them
 _FAR: Final = 1e3  # inputs more spreads from 0 are shifted to 0 first: rounding would hide their differences
+
+
+class Learnt(NamedTuple):
+    """Exemplars in lengths, ``(n, dim)``; origin and size of a length ``(2, dim)``; kernel ``(4,)``, see `Kernel`."""
+
+    inputs: PolicyNeighbours
+    units: Array
+    kernel: Array
 
 
 class LocalProcess(Inverse):
@@ -90,6 +98,11 @@ class LocalProcess(Inverse):
         (rows,) = self._inputs.nearest(here[None], _LEARNT)
         kernels = compiled("sgimd_torch.inverses.kernels")
         return kernels.foretell(self._inputs.keys.rows, self.memory.outcomes, rows, here, self._kernel)
+
+    def learnt(self) -> Learnt | None:
+        """What predictions are made from; None while there are too few exemplars, or all outcomes are equal."""
+        self._catch_up()
+        return None if self._kernel is None else Learnt(self._inputs, self._units, self._kernel)
 
     def _catch_up(self) -> None:
         """Add new exemplars; refit when the memory has grown by half."""

@@ -14,18 +14,28 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.learner.events import Event, Kind
+from sgimd_torch.learner.events import Change, Event, Kind
 from sgimd_torch.learner.places import Place
 from sgimd_torch.parts import Inverse, Problem, Social, Strategy
 from sgimd_torch.spaces import Array, Demonstration, Failure, Lesson, Move, Request, check_point, read_only
 
 Correspondence = Callable[[Array, Array], Array]
 """Function from times ``(n_times,)`` and trajectory ``(n_times, n_joints)`` to theta_d ``(theta_dim,)``, eq. (6)."""
+
+
+class Watcher(Protocol):
+    """Notices changes of the robot, see `sgimd_torch.changes`."""
+
+    def expect(self, context: Array, theta: Array, outcome: Array) -> None:
+        """Compare an outcome, which is not in memory yet, with what is expected."""
+
+    def look(self) -> tuple[Learner, Change | None] | None:
+        """A learner to go on as, and the change if a new one was noticed; None to go on."""
 
 
 class Learner:
@@ -38,8 +48,11 @@ class Learner:
         correspondence: function from times and trajectory to theta_d, eq. (6); needed with ``social``.
 
     Attributes:
-        memory: exemplars, the memory of the problem.
+        memory: all exemplars.
+        problem: problem to learn; after a change of the robot its memory holds only exemplars that still help.
         inverse: inverse model; another inverse model of this problem may replace it.
+        watcher: object that notices changes of the robot; None: nobody does.
+        changes: changes of the robot so far.
         listeners: functions that are called with each `Event`, after it has happened.
         begun: number of exemplars at the start.
         movements: number of movements, rests and failed movements included.
@@ -63,6 +76,8 @@ class Learner:
         self.inverse: Inverse = problem.inverse
         self.listeners: list[Callable[[Event], object]] = []
         self.begun, self.movements = len(self.memory), 0
+        self.watcher: Watcher | None = None
+        self.changes: list[Change] = []
         self._life: list[tuple[int, int] | Event] = []  # events; for a movement, its row in memory and its place
         self._places = [Place(0)]
         self._new: list[Place] = []  # places whose attempt no event has reported so far, in order of beginning
@@ -243,6 +258,7 @@ class Learner:
         self._asked = []
         for (place, _), move, outcome in zip(asked, moves, told, strict=True):
             self._tell(place, move, outcome)
+        self._look()
 
     def amend(self, theta: Array, *, place: int = 0) -> None:
         """Replace the movement that is asked for at ``place`` by the recorded ``theta``, which equals it but for
@@ -300,8 +316,9 @@ class Learner:
         theta = read_only(self.problem.policies.check("theta", check_point("theta", theta, self.memory.theta_dim)))
         outcome = read_only(self.memory.check_outcome(theta, outcome))
         self._report_new()
-        self.memory.add(context, theta, outcome)
+        self._remember(context, theta, outcome)
         self._publish(Event(Kind.ADDED, context, theta, outcome=outcome))
+        self._look()
 
     def translate(self, demonstration: Demonstration) -> Array:
         """theta_d, eq. (6): the policy that corresponds to a demonstration.
@@ -412,11 +429,31 @@ class Learner:
             self._publish(Event(Kind.RESTED, place.context, place=place.number))
         else:
             assert place.context is not None
-            self.memory.add(place.context, move.theta, outcome)
+            self._remember(place.context, move.theta, outcome)
             row = len(self.memory) - 1
             moved = place.moved(Kind.MOVED, move, self.memory.outcomes[-1])
             place.advance(moved.outcome)
             self._publish(moved, row=row)
+
+    def _remember(self, context: Array, theta: Array, outcome: Array) -> None:
+        if self.watcher is not None:
+            self.watcher.expect(context, theta, outcome)
+        self.memory.add(context, theta, outcome)
+        if self.problem.memory is not self.memory:
+            self.problem.memory.add(context, theta, outcome)
+
+    def _look(self) -> None:
+        """Begin again if the robot has changed: attempts end, and all parts are built anew."""
+        found = None if self.watcher is None else self.watcher.look()
+        if found is None:
+            return
+        for place in self._places:
+            place.end()
+        new, change = found
+        self.problem, self.inverse, self.autonomous, self.social = new.problem, new.inverse, new.autonomous, new.social
+        if change is not None:
+            self.changes.append(change)
+            self._publish(Event(Kind.CHANGED, reply=str(change)))
 
     def _publish(self, *events: Event, row: int | None = None) -> None:
         for event in events:

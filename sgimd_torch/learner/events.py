@@ -19,8 +19,27 @@ class Kind(StrEnum):
     SHOWN = "shown"
     ASKED = "asked"  # request; ``reply`` is its result, and after "shown" the next event is the demonstration
     ADDED = "added"  # exemplar of a movement that the learner has not proposed
+    CHANGED = "changed"  # a change of the robot was noticed, ``reply`` describes it; a replay notices it again
     FAILED = "failed"  # movement without an outcome, for the reason ``reply``; if theta is None, no context was seen
     INTERRUPTED = "interrupted"  # interruption by the caller, before an outcome was told; place -1: between movements
+
+
+class Change(NamedTuple):
+    """A change of the robot: number of the first movement after it, number of movements when it was noticed, number of
+    exemplars before it, and how many of these still help."""
+
+    since: int
+    noticed: int
+    before: int
+    helpful: int
+
+    def __str__(self) -> str:
+        kept = (
+            f"{self.helpful} of {self.before} exemplars of before still help"
+            if self.helpful
+            else "nothing of before helps"
+        )
+        return f"since movement {self.since} outcomes are not what they were: {kept}"
 
 
 class Event(NamedTuple):

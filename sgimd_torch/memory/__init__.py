@@ -77,7 +77,7 @@ class Memory:
         """
         context = check_point("context", context, self.context_dim, _NO_CONTEXT)
         theta = check_point("theta", theta, self.theta_dim, "was a goal passed instead?")
-        self._append(context[None], theta[None], self.check_outcome(theta, outcome)[None])
+        self.extend(context[None], theta[None], self.check_outcome(theta, outcome)[None])
 
     def check_outcome(self, theta: Array, outcome: ArrayLike) -> Array:
         """The outcome ``(outcome_dim,)`` of a ``theta`` as float64.
@@ -125,10 +125,11 @@ class Memory:
     def copy(self) -> Memory:
         """A memory with copies of the exemplars."""
         same = Memory(self.context_dim, self.theta_dim, self.outcome_dim)
-        same._append(self.contexts, self.thetas, self.outcomes)
+        same.extend(self.contexts, self.thetas, self.outcomes)
         return same
 
-    def _append(self, contexts: Array, thetas: Array, outcomes: Array) -> None:
+    def extend(self, contexts: Array, thetas: Array, outcomes: Array) -> None:
+        """Remember exemplars ``(n, dim)`` that another memory has checked."""
         for table, rows in ((self._contexts, contexts), (self._thetas, thetas), (self._outcomes, outcomes)):
             table.append(rows)
         if len(thetas):

@@ -55,7 +55,8 @@ def compiled(name: str) -> ModuleType:
 
 def compile_all() -> None:
     """Compile all functions that are not in the cache yet."""
-    _compile("sgimd_torch.inverses.kernels", "sgimd_torch.inverses.linear_kernel", "sgimd_torch.memory.scan")
+    names = ("inverses.kernels", "inverses.linear_kernel", "memory.scan", "changes.kernels")
+    _compile(*(f"sgimd_torch.{name}" for name in names))
 
 
 def _compile(*names: str) -> None:

@@ -20,7 +20,7 @@ from sgimd_torch.record.layout import ReplayError
 from sgimd_torch.spaces import Array, Box, Demonstration, Episode, Failure, Move, Request
 
 _HINT: Final = "was it recorded by another version, on another processor or with another configuration?"
-_ALONE: Final = (Kind.SHOWN, Kind.ASKED, Kind.ADDED)  # events that are never grouped with others
+_ALONE: Final = (Kind.SHOWN, Kind.ASKED, Kind.ADDED, Kind.CHANGED)  # events that are never grouped with others
 _ROUNDED: Final = (
     "movement {} was recorded with a theta that differs by rounding: another version or processor made the record. The "
     "learner remembers the recorded theta"
@@ -85,6 +85,8 @@ def replay(
                 assert event.theta is not None
                 assert event.outcome is not None
                 learner.add(event.context, event.theta, event.outcome)
+            case Kind.CHANGED:  # the learner has noticed it again
+                pass
             case Kind.INTERRUPTED if between:
                 learner.interrupt()
                 asked_until = index  # when the run was resumed, its teacher was asked again

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from sgimd_torch.catalogue import called, function_of, load_word
 from sgimd_torch.environments.protocol import Environment, FromFiles
 from sgimd_torch.evaluation import Benchmark
+from sgimd_torch.files import checksum
 from sgimd_torch.inverses.among_effects import AmongEffects
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Learner
@@ -33,7 +35,6 @@ class RunParts:
         learner: learner, freshly built.
         teacher: teacher who demonstrates without being asked; None: no teacher.
         teachers: teachers who are asked, by name.
-        answers: inverse models for evaluations, by name; the run's own inverse model comes first.
         benchmark: goals of evaluations.
         data: checksums of the files that were read.
         notes: messages for the user.
@@ -44,7 +45,6 @@ class RunParts:
     learner: Learner
     teacher: Teacher | None
     teachers: Mapping[str, Demonstrator]
-    answers: dict[str, Inverse]
     benchmark: Benchmark
     data: dict[str, str | None]
     notes: Sequence[str]
@@ -53,6 +53,11 @@ class RunParts:
     def environment(self) -> Environment:
         """Robot of the task."""
         return self.task.environment
+
+    @property
+    def answers(self) -> dict[str, Inverse]:
+        """Inverse models for evaluations, by name, the run's own first; after a change of the robot they are others."""
+        return _answers(self.config, self.learner)
 
 
 def build(config: Config) -> RunParts:
@@ -87,6 +92,13 @@ def build(config: Config) -> RunParts:
             teachers[word] = Demonstrator.of(make, demonstrations, stream(config.seed, f"teacher {word}"))
         if teachers:
             shown["teachers"] = teachers
+    begin_with_crc32 = None
+    if config.begin_with is not None:
+        from sgimd_torch.runs.past import past_of  # few runs begin with a past
+
+        shown["prior"] = past_of(config.begin_with, task.environment)
+        notes = [*notes, f"begins with {len(shown['prior'])} movements of {config.begin_with}, as far as they help"]
+        begin_with_crc32 = checksum(config.begin_with)
     algorithm = f"algorithm {config.algorithm}"
     learner = called(algorithm, config.constructor(ALGORITHM), task.environment, config.seed, **shown)
     if not isinstance(learner, Learner):
@@ -94,19 +106,19 @@ def build(config: Config) -> RunParts:
     if config.until is not None and not isinstance(learner.inverse, LocalProcess | AmongEffects):
         name = type(learner.inverse).__name__
         raise ValueError(f"--until needs an inverse model that says how sure it is, such as process; {name} does not")
-    answers = {OWN: learner.inverse}
-    for word in config.evaluated_by[1:]:
-        learnt_with = config.values.get("inverse") == word
-        answers[word] = learner.inverse if learnt_with else Inverse.of(load_word("inverse", word), learner.problem)
+    _answers(config, learner)  # made now, so that their remarks are among the notes
     return RunParts(
         config=config,
         task=task,
         learner=learner,
         teacher=teacher,
         teachers=teachers,
-        answers=answers,
         benchmark=benchmark,
-        data={"demonstrations_crc32": demonstrations_crc32, "benchmark_crc32": benchmark_crc32},
+        data={
+            "demonstrations_crc32": demonstrations_crc32,
+            "benchmark_crc32": benchmark_crc32,
+            "begin_with_crc32": begin_with_crc32,
+        },
         notes=[*notes, *learner.problem.remarks],
     )
 
@@ -119,6 +131,15 @@ def task_of(config: Config) -> Task:
     """
     task = called(f"environment {config['environment']}", config.constructor("environment"))
     return task if isinstance(task, Task) else Task(task)
+
+
+def _answers(config: Config, learner: Learner) -> dict[str, Inverse]:
+    problem, found = learner.problem, {OWN: learner.inverse}
+    for word in config.evaluated_by[1:]:
+        make = partial(Inverse.of, load_word("inverse", word), problem)
+        learnt_with = config.values.get("inverse") == word
+        found[word] = learner.inverse if learnt_with else problem.shared(f"answer {word}", make)
+    return found
 
 
 def with_found(config: Config, robot: Environment) -> Config:

@@ -18,10 +18,10 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple, Self
 
 from sgimd_torch.catalogue import PLACES, ROD, TAUGHT_BY, WORDS, did_you_mean, load_word, place_of, word_of
-from sgimd_torch.catalogue.options import Option, choices_of, options_of
+from sgimd_torch.catalogue.options import Option, choices_of, options_of, parameters_of
 
 OWN: Final = "own"  # name of the run's own inverse model
-FILES: Final = ("benchmark", "demonstrations")  # options that name a file
+FILES: Final = ("benchmark", "demonstrations", "begin_with")  # options that name a file
 THREADS: Final = "environment.threads"
 PLACE: Final = ("seed", "out", "name", "board", THREADS)  # seed, place, display and speed of a run
 EVALUATES: Final = ("evaluated_by", "repeats", "floor_at", "benchmark_crc32")  # equal options of all evaluations
@@ -56,6 +56,7 @@ class Config:
         floor_at: evaluations that measure noise; null: the last; []: none.
         benchmark: file of goals for evaluations; null: the environment's own.
         demonstrations: file of recorded demonstrations; null: the environment's own.
+        begin_with: run.sqlite or csv of another robot or simulator to begin with; null: none.
         failures: number of failed movements in a row that stops the run; null: 10.
         at_once: number of robots that move at once; after each 30 movements one more robot joins.
         parts: parts and their options by name, such as "goals" or "goals.window"; defaults may be left out.
@@ -78,6 +79,7 @@ class Config:
     floor_at: tuple[int, ...] | None = None
     benchmark: Path | None = None
     demonstrations: Path | None = None
+    begin_with: Path | None = None
     failures: int | None = None
     at_once: int = 1
     parts: Mapping[str, Any] | tuple[tuple[str, Any], ...] = ()
@@ -113,6 +115,8 @@ class Config:
             raise self._refused("teachers")
         if self.demonstrations is not None and not self.teaching:
             raise self._refused("demonstrations")
+        if self.begin_with is not None and "prior" not in parameters_of(self.chosen[ALGORITHM].make):
+            raise ValueError(f"--begin-with: algorithm {self.algorithm} does not learn from another robot")
         if self.board and importlib.util.find_spec("tensorboardX") is None:
             raise ValueError("board true needs tensorboardX, which is not installed; pip install 'sgimd-torch[board]'")
         if self.variant in ("", ".", "..") or any(sign in self.variant for sign in "/\\\0"):

@@ -1,6 +1,6 @@
 """Evaluations of a run's inverse models: those in its record, and new ones, which are added to the record.
 
-evaluations = Evaluations(config, arm, benchmark, learner, {"own": learner.inverse}, record)
+evaluations = Evaluations(build(config), record)
 evaluations.after(500)["own"].mean_error
 """
 
@@ -12,13 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from sgimd_torch.environments.protocol import Environment
-from sgimd_torch.evaluation import Benchmark, Evaluation, evaluate
+from sgimd_torch.evaluation import Evaluation, evaluate
 from sgimd_torch.goals.regions import Region
-from sgimd_torch.learner import Learner
-from sgimd_torch.parts import Inverse
 from sgimd_torch.record import Record
-from sgimd_torch.runs.config import OWN, Config
+from sgimd_torch.runs.build import RunParts
+from sgimd_torch.runs.config import OWN
 
 ByInverse = Mapping[str, Evaluation]
 """The evaluation of each inverse model, by name, the run's own inverse model first."""
@@ -29,8 +27,7 @@ class Evaluations:
     """All evaluations of a run, by the number of movements before each one.
 
     Args:
-        config, environment, benchmark, learner: parts of the run.
-        inverses: inverse models to evaluate, by name, the run's own first; all of them read the learner's memory.
+        parts: parts of the run; their ``answers`` are evaluated.
         record: record of the run; movements of an evaluation are not recorded.
         between: function to call between movements of an evaluation; it may raise `KeyboardInterrupt`.
 
@@ -38,11 +35,7 @@ class Evaluations:
         made: number of movements of all evaluations so far, recorded ones included.
     """
 
-    config: Config
-    environment: Environment
-    benchmark: Benchmark
-    learner: Learner
-    inverses: Mapping[str, Inverse]
+    parts: RunParts
     record: Record
     between: Callable[[], object] = bool
 
@@ -63,15 +56,15 @@ class Evaluations:
 
     def size(self, movements: int) -> int:
         """Number of movements of the evaluation after this number of ``movements``."""
-        different = len(set(map(id, self.inverses.values())))
-        return len(self.benchmark.goals) * (different + self._repeats(movements))
+        different = len(set(map(id, self.parts.answers.values())))
+        return len(self.parts.benchmark.goals) * (different + self._repeats(movements))
 
     def after(self, movements: int) -> ByInverse | None:
         """The recorded evaluation after this number of movements, else a new evaluation of the present learner.
 
         The result is None while memory is empty: the observing learner remembers nothing before a demonstration.
         """
-        if movements not in self._found and len(self.learner.memory):
+        if movements not in self._found and len(self.parts.learner.memory):
             self._found[movements] = self._evaluate(movements)
             self.made += self.size(movements)
             self._write(movements, self._found[movements])
@@ -82,23 +75,25 @@ class Evaluations:
 
         At each goal the noise is the same for all inverse models. The noise floor is measured for the run's own model.
         """
-        config, (own, *others) = self.config, self.inverses
-        repeats = self._repeats(movements)
-        judged: tuple[Any, ...] = self.environment, self.benchmark.goals, config.seed, movements
+        inverses, repeats = self.parts.answers, self._repeats(movements)
+        own, *others = inverses
+        parts = self.parts
+        judged: tuple[Any, ...] = parts.environment, parts.benchmark.goals, parts.config.seed, movements
         how: dict[str, Any] = {"between": self.between}
-        found = {own: evaluate(self.inverses[own], *judged, repeats=repeats, **how)}
+        found = {own: evaluate(inverses[own], *judged, repeats=repeats, **how)}
         for word in others:
-            same = self.inverses[word] is self.inverses[own]
-            found[word] = found[own].without_noise if same else evaluate(self.inverses[word], *judged, repeats=0, **how)
+            same = inverses[word] is inverses[own]
+            found[word] = found[own].without_noise if same else evaluate(inverses[word], *judged, repeats=0, **how)
         return found
 
     def _repeats(self, movements: int) -> int:
-        return self.config.repeats if self.config.due(movements, self.config.floors) else 0
+        config = self.parts.config
+        return config.repeats if config.due(movements, config.floors) else 0
 
     def _write(self, movements: int, found: ByInverse) -> None:
         """Add evaluations to the record, and the current regions of the goal model."""
         for word, each in found.items():
-            errors, met = each.errors, each.met(self.benchmark.side / 2)
+            errors, met = each.errors, each.met(self.parts.benchmark.side / 2)
             quantiles = np.median(errors), np.quantile(errors, 0.9)
             summary = each.mean_error, *quantiles, each.noise_floor, each.expected.mean(), met
             self.record.add_rows("evaluations", [(movements, word, *summary)])
@@ -106,7 +101,7 @@ class Evaluations:
             columns = zip(*numbers, each.contexts, strict=True)
             rows = [(movements, word, k, *more, *context) for k, (*more, context) in enumerate(columns)]
             self.record.add_rows("errors", rows)
-        self.record.add_rows("regions", [(movements, *_fields(region)) for region in self.learner.regions])
+        self.record.add_rows("regions", [(movements, *_fields(region)) for region in self.parts.learner.regions])
 
 
 def _evaluation(numbers: np.ndarray) -> Evaluation:

@@ -41,6 +41,7 @@ class Run:
         spaces: boxes C, Pi and T, by the names "contexts", "policies" and "outcomes".
         summary: numbers of "movements" and of "failed" movements, whether the run is "finished", seconds by part, and
             "expected", the mean error that the learner expected when ``--until`` ended the run, or None.
+        changes: descriptions of the changes of the robot that the learner noticed.
         index: ``(n,)`` numbers of the movements, from 0.
         origin: ``(n,)`` origin of each movement, such as "local" or "imitate"; "" for a rest.
         demonstration: ``(n,)`` indices in ``demonstrations`` of what was shown just before each movement; -1: nothing.
@@ -65,6 +66,7 @@ class Run:
     words: list[str]
     spaces: dict[str, Box]
     summary: dict[str, Any]
+    changes: list[str]
     index: NDArray[np.int64]
     origin: NDArray[np.str_]
     demonstration: NDArray[np.int64]
@@ -190,10 +192,8 @@ def _lived(record: Record) -> tuple[dict[str, Any], Columns | None]:
     """Movements as arrays by attribute of `Run`, and requests as columns or None."""
     c, p, t = record.dims
     origins, shown, cells, requests = list[str](), array("q"), array("d"), list[dict[str, Any]]()
-    failed, lessons = (
-        list[bool](),
-        dict[int, int](),
-    )  # lessons by number of the next movement of the robot that was shown them
+    changes, failed = list[str](), list[bool]()
+    lessons = dict[int, int]()  # lessons by number of the next movement of the robot that was shown them
     for _, kind, origin, *vectors, lesson, who, strategy, reply, place in record.rows("events"):
         if lesson is not None:
             lessons[len(origins) + place] = lesson
@@ -203,6 +203,8 @@ def _lived(record: Record) -> tuple[dict[str, Any], Columns | None]:
             asked = {"index": len(origins) + place, "teacher": who, "strategy": strategy, "reply": reply, "shown": -1}
             wanted = enumerate((*vectors[:c], *vectors[c + p : c + p + t]))
             requests.append(asked | {f"wanted_{k}": value for k, value in wanted})
+        elif kind == Kind.CHANGED:
+            changes.append(reply)
         elif kind in (Kind.MOVED, Kind.RESTED, Kind.FAILED):
             failed.append(kind == Kind.FAILED)
             shown.append(lessons.pop(len(origins), -1))
@@ -210,8 +212,8 @@ def _lived(record: Record) -> tuple[dict[str, Any], Columns | None]:
             cells.extend(np.nan if value is None else value for value in vectors)
     n = len(origins)
     vectors_of = np.split(np.array(cells).reshape(n, c + p + 2 * t), (c, c + p, c + p + t), axis=1)
-    found = {"index": np.arange(n), "origin": np.array(origins, np.str_), "demonstration": np.array(shown, np.int64)}
-    found["failed"] = np.array(failed, np.bool_)
+    found: dict[str, Any] = {"changes": changes, "failed": np.array(failed, np.bool_), "index": np.arange(n)}
+    found |= {"origin": np.array(origins, np.str_), "demonstration": np.array(shown, np.int64)}
     found |= dict(zip(("contexts", "thetas", "goals", "outcomes"), vectors_of, strict=True))
     columns = {name: np.array([each[name] for each in requests]) for name in requests[0]} if requests else None
     return found, columns

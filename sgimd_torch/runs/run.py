@@ -16,6 +16,7 @@ from typing import Final, Protocol, Self
 
 from sgimd_torch.environments.protocol import FAILURES, SimulationError
 from sgimd_torch.evaluation import Evaluation
+from sgimd_torch.learner.events import Event, Kind
 from sgimd_torch.record import ReplayError, RunError
 from sgimd_torch.runs.at_once import executing
 from sgimd_torch.runs.build import RunParts
@@ -85,8 +86,8 @@ class Life:
         say(*parts.notes, *notes)
         self.movements, self.recorded, self.failed = 0, self.record.movements, 0
         self.seconds = Seconds(self.record.about.get("seconds", {}))
-        judged = parts.config, parts.environment, parts.benchmark, parts.learner, parts.answers
-        self.evaluations = Evaluations(*judged, self.record)
+        self.evaluations = Evaluations(parts, self.record)
+        parts.learner.listeners.append(self._hear)
         self.listeners: list[Listener] = [each.listener(self) for each in parts.learner.problem.trained]
         if parts.config.board:
             from sgimd_torch.board.listener import BoardListener  # loaded here, as most runs have no board
@@ -216,6 +217,10 @@ class Life:
             self._keep()
             raise Stopped(stopping.heard)
 
+    def _hear(self, event: Event) -> None:
+        if event.kind == Kind.CHANGED and not self.replaying:
+            say(str(event.reply))
+
     def _curves(self) -> dict[str, float]:
         """Numbers of the listeners for the board since the last call, by tag."""
         return {tag: value for each in self.listeners for tag, value in each.curves().items()}
@@ -254,7 +259,7 @@ class Life:
         with self.seconds.of("learner"):
             ends = ends_now(self.parts, self.record, self.movements)
         if ends and config.evaluations:
-            self.evaluations.config = replace(config, movements=self.movements)
+            self.evaluations.parts = replace(self.parts, config=replace(config, movements=self.movements))
             self._evaluate()
         return ends
 

@@ -38,7 +38,7 @@ OTHERS = (  # each in a folder of its own
     "docs/runs.md",
     *(
         f"docs/how-to/{name}.md"
-        for name in ("ablations", "gymnasium", "mujoco", "real-robot", "resuming", "several-robots")
+        for name in ("ablations", "gymnasium", "mujoco", "real-robot", "resuming", "several-robots", "sim-to-real")
     ),
     *(f"docs/explained/{name}.md" for name in ("random-numbers", "noise")),
     pytest.param("docs/tutorial.md", marks=pytest.mark.slow),  # the rod's physics

@@ -38,6 +38,8 @@ def doubts(variants: Sequence[Variant]) -> Iterator[str]:
     lasts = sorted({variant.last for variant in variants if variant.last})
     if len(lasts) > 1:
         yield f"The last errors belong to different numbers of movements: {', '.join(map(str, lasts))}."
+    for run in every:
+        yield from (f"{run.path}: {change}." for change in run.changes)
     cut = [run for run in every if not run.summary["finished"]]
     if cut:
         named = [f"{run.path}: {len(run.index)} of {run.config['movements']} movements" for run in cut]

@@ -1,0 +1,95 @@
+"""A robot that changes: the learner notices it, and what was learnt before counts only as far as it still holds.
+
+Our addition. When a change is noticed, the learner begins again: it is built anew by the function that has built it.
+The memory of its problem then holds all movements since the change, and those of before that help to predict them, as
+they are or calibrated. The paper asks that a learner focus again where it gets worse (section 3.2.1).
+    return watched(begin, seed, memory, prior)    # at the end of an algorithm
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Final
+
+from sgimd_torch.inverses.among_effects import AmongEffects
+from sgimd_torch.inverses.local_process import LocalProcess
+from sgimd_torch.learner import Learner
+from sgimd_torch.learner.events import Change
+from sgimd_torch.memory import Memory
+from sgimd_torch.spaces import Array, stream
+
+if TYPE_CHECKING:
+    from sgimd_torch.changes.notice import Notice
+
+_FIRST: Final = 32  # exemplars before any movement is predicted
+
+Begin = Callable[[int, Memory | None], Learner]
+"""Function (seed, exemplars to start from) -> learner."""
+
+
+def watched(begin: Begin, seed: int, memory: Memory | None, prior: Memory | None) -> Learner:
+    """The learner that ``begin`` builds; it begins again when its robot has changed.
+
+    Args:
+        begin: function that builds the learner.
+        seed: number from which all random streams of the learner come.
+        memory: exemplars to start from; None: no exemplars.
+        prior: exemplars of another robot, such as a simulator; they count as far as they hold. None: no exemplars.
+
+    Raises:
+        ValueError: both ``memory`` and ``prior`` are given.
+    """
+    if memory is not None and prior is not None:
+        raise ValueError("give memory, exemplars of this robot, or prior, exemplars of another robot; got both")
+    learner = begin(seed, memory if prior is None else prior)
+    if _process_of(learner) is not None:
+        learner.watcher = Watcher(begin, learner, prior)
+    else:
+        name = type(learner.inverse).__name__
+        learner.problem.remarks.append(f"changes of the robot are not noticed: {name} does not say how sure it is")
+    return learner
+
+
+class Watcher:
+    """Notices changes of the robot of a ``learner``. With a ``prior``, the learner's memory becomes empty."""
+
+    def __init__(self, begin: Begin, learner: Learner, prior: Memory | None) -> None:
+        self._begin, self._learner, self._prior, self._seed = begin, learner, prior, learner.problem.seed
+        self._notice: Notice | None = None
+        if prior is not None:
+            learner.memory, learner.begun = Memory(*learner.problem.dims), 0
+        self._numbers = [0] * learner.begun  # of each exemplar the number of its movement, or of the last one before it
+
+    def expect(self, context: Array, theta: Array, outcome: Array) -> None:
+        """Compare an outcome, which is not in memory yet, with what is expected."""
+        learner, process = self._learner, _process_of(self._learner)
+        self._numbers.append(max(0, learner.movements - 1))
+        if process is None or (self._prior is None and len(process.memory) < _FIRST):
+            return
+        if self._notice is None:
+            from sgimd_torch.changes.notice import Notice  # the first movements of a life do not need it
+
+            self._notice = Notice(learner.problem, learner.memory, self._prior)
+        self._notice.expect(process, context, theta, outcome)
+
+    def look(self) -> tuple[Learner, Change | None] | None:
+        """A learner to go on as, and the change if a new one was noticed; None to go on."""
+        learner, process = self._learner, _process_of(self._learner)
+        if self._notice is None or process is None or learner.problem.trained:
+            return None
+        found = self._notice.look(process)
+        if found is None:
+            return None
+        n = len(learner.memory)
+        seed = int(stream(self._seed, "begin again", n).integers(2**63))
+        new = self._begin(seed, found.exemplars.memory)
+        if not found.new:
+            return new, None
+        since = self._numbers[self._notice.since]
+        return new, Change(since, learner.movements, found.before, found.kept)
+
+
+def _process_of(learner: Learner) -> LocalProcess | None:
+    inverse = learner.inverse
+    inverse = inverse.of_all if isinstance(inverse, AmongEffects) else inverse
+    return inverse if isinstance(inverse, LocalProcess) else None

@@ -1,0 +1,35 @@
+"""Predictions of many movements by local Gaussian processes, compiled by numba. Import it through `compiled`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sgimd_torch.inverses.kernels import covariances, expected, fitted, unknown
+from sgimd_torch.memory.jit import LISTS, NUMBERS, TABLE, called, columns
+from sgimd_torch.spaces import Array
+
+
+@called(TABLE, TABLE, LISTS, TABLE, NUMBERS)
+def predict(inputs: Array, outcomes: Array, near: np.ndarray, here: Array, kernel: Array) -> tuple[Array, Array, Array]:
+    """Expected outcomes ``(n, outcome_dim)`` of movements, their variances ``(n,)``, noise included, and the slopes of
+    the outcomes by the inputs, ``(n, outcome_dim, dim)``.
+
+    Args:
+        inputs, outcomes: ``(rows, dim)``, in lengths, and ``(rows, outcome_dim)``, exemplars.
+        near: ``(n, k)``, rows of the exemplars from which each movement is predicted.
+        here: ``(n, dim)``, the movements in lengths.
+        kernel: ``(4,)``, see `Process`.
+    """
+    n, m, dim = len(here), outcomes.shape[1], here.shape[1]
+    found, variances, slopes = np.empty((n, m)), np.empty(n), np.empty((n, m, dim))
+    covariance, slope = np.empty(near.shape[1]), np.empty(near.shape[1])
+    for i in range(n):
+        rows, point = near[i].copy(), here[i].copy()
+        process = fitted(columns(inputs, rows), columns(outcomes, rows), kernel)
+        covariances(process.inputs, kernel, point, covariance, slope)
+        found[i] = expected(process, covariance)
+        variances[i] = unknown(process, covariance) + process.variance * kernel[3]
+        for k in range(m):
+            pull = process.weights[k] * slope
+            slopes[i, k] = point * pull.sum() - process.inputs @ pull
+    return found, variances, slopes

@@ -1,0 +1,101 @@
+"""A regime: what a local process has learnt while the robot was the same, and predictions from it.
+
+regime = Regime(learnt, exemplars); outcomes, variances, slopes = regime.predict(contexts, thetas)
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sgimd_torch.inverses.local_process import Learnt
+from sgimd_torch.memory import Memory, Rows
+from sgimd_torch.memory.compiled import compiled
+from sgimd_torch.memory.neighbours import PolicyNeighbours, Table
+from sgimd_torch.spaces import Array
+
+NEAR: Final = 60  # largest number of exemplars from which a movement is predicted
+
+
+class Exemplars(NamedTuple):
+    """Contexts, thetas and outcomes of some movements, ``(n, dim)`` each."""
+
+    contexts: Array
+    thetas: Array
+    outcomes: Array
+
+    @classmethod
+    def of(cls, memory: Memory, rows: slice | Rows = slice(None)) -> Self:
+        """Some exemplars of a memory."""
+        return cls(memory.contexts[rows], memory.thetas[rows], memory.outcomes[rows])
+
+    def some(self, rows: slice | Rows | NDArray[np.bool_]) -> Exemplars:
+        """Some of these exemplars."""
+        return Exemplars(*(table[rows] for table in self))
+
+    def and_then(self, others: Exemplars) -> Exemplars:
+        """These exemplars, then the others."""
+        return Exemplars(*map(np.concatenate, zip(self, others, strict=True)))
+
+    @property
+    def memory(self) -> Memory:
+        """A memory of these exemplars."""
+        memory = Memory(*(table.shape[1] for table in self))
+        memory.extend(*self)
+        return memory
+
+
+class Regime:
+    """Predictions from some ``exemplars`` at any theta, outside Pi, too, by lengths and kernel of ``learnt``."""
+
+    def __init__(self, learnt: Learnt, exemplars: Exemplars) -> None:
+        self.learnt, self.exemplars = learnt, exemplars
+        here = self._in_lengths(exemplars)
+        self._neighbours = PolicyNeighbours(Table(here.shape[1]))
+        self._neighbours.keys.append(here)
+
+    def predict(self, asked: Exemplars) -> tuple[Array, Array, Array]:
+        """Outcomes ``(n, outcome_dim)``, variances ``(n,)`` with noise, slopes ``(n, outcome_dim, theta_dim)``."""
+        here, dim = self._in_lengths(asked), asked.thetas.shape[1]
+        found, variances, slopes = self._predict(self._neighbours.nearest(here, NEAR), here)
+        return found, variances, slopes[:, :, :dim] / self.learnt.units[1, :dim]
+
+    def errors(self, told: Exemplars) -> Array:
+        """Squared errors ``(n,)`` of predicting these movements."""
+        return squared(self.predict(told)[0] - told.outcomes)
+
+    def left_out(self, rows: Rows) -> tuple[Array, Array]:
+        """Squared errors ``(n,)`` of predicting each of these rows from all other rows, and their variances."""
+        here = self._neighbours.keys.rows[rows]
+        near = self._neighbours.nearest(here, NEAR + 1)
+        itself_last = np.argsort(near == rows[:, None], axis=1, kind="stable")
+        found, variances, _ = self._predict(np.take_along_axis(near, itself_last[:, :-1], axis=1), here)
+        return squared(found - self.exemplars.outcomes[rows]), variances
+
+    def doubt(self, rows: Rows) -> float:
+        """Mean squared error of predicting each of these rows from all others, divided by the expected one."""
+        errors, variances = self.left_out(rows)
+        return float(errors.sum() / (variances.sum() * self.exemplars.outcomes.shape[1] + 1e-300))
+
+    def _in_lengths(self, some: Exemplars) -> Array:
+        raw, (origin, size) = np.concatenate((some.thetas, some.contexts), axis=1), self.learnt.units
+        return np.asarray((raw - origin) / size)
+
+    def _predict(self, near: Rows, here: Array) -> tuple[Array, Array, Array]:
+        return predicted(self._neighbours, self.exemplars.outcomes, near, here, self.learnt.kernel)
+
+
+def predicted(
+    inputs: PolicyNeighbours, outcomes: Array, near: Rows, here: Array, kernel: Array
+) -> tuple[Array, Array, Array]:
+    """Result of `kernels.predict`."""
+    predict = compiled("sgimd_torch.changes.kernels").predict
+    found: tuple[Array, Array, Array] = predict(inputs.keys.rows, outcomes, near, here, kernel)
+    return found
+
+
+def squared(differences: Array) -> Array:
+    """Squared lengths of vectors, over the last axis."""
+    return np.asarray((differences * differences).sum(axis=-1))

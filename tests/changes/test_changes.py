@@ -1,0 +1,207 @@
+"""A robot that changes: it is noticed, told and repeated, and what was learnt before counts only as far as it holds."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+
+from changing import Changing
+from sgimd_torch.algorithms.paper import sagg_riac, sgim_d
+from sgimd_torch.algorithms.practice import practice
+from sgimd_torch.changes.calibration import Calibration
+from sgimd_torch.changes.regimes import Exemplars, Regime
+from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.evaluation import evaluate
+from sgimd_torch.inverses.local import LocalInverse
+from sgimd_torch.inverses.local_process import LocalProcess
+from sgimd_torch.learner.events import Kind
+from sgimd_torch.record.lives import load_life, save_life
+from sgimd_torch.session import run
+from sgimd_torch.spaces import Failure, stream
+from sgimd_torch.teachers import PeriodicTeacher
+from worlds import NO_CONTEXT, demonstrate, demonstrations, executed, last_posture, problem
+
+ARM = PlanarArm(3)
+GOALS = np.array([[0.3, 0.4], [-0.4, 0.5], [0.6, -0.1], [0.1, -0.7]])
+LIVES = {"practice": practice, "sagg-riac": sagg_riac, "sgim-d": partial(sgim_d, correspondence=last_posture)}
+
+
+def live(learner, robot, movements, at_once=1, seed=0, teacher=None):
+    """Let a learner move; returns the thetas."""
+    thetas = []
+    for episode in run(learner, robot, seed, movements=movements, at_once=at_once, teacher=teacher):
+        robot.made = episode.index + 1
+        thetas.append(np.full(robot.policies.dim, np.nan) if episode.move is None else episode.move.theta)
+    return np.array(thetas)
+
+
+def error(learner, robot):
+    return evaluate(learner.inverse, robot, GOALS, 1, step=0, repeats=0).mean_error
+
+
+def blind(learner):
+    learner.watcher = None
+    return learner
+
+
+@pytest.fixture(scope="module")
+def changed():
+    """A life of practice on an arm of seven joints, which shift after 400 movements."""
+    robot = Changing(PlanarArm(7), "offset-0.05", 400)
+    learner = practice(robot, 3)
+    live(learner, robot, 500)
+    return learner, robot
+
+
+@pytest.mark.parametrize("name", LIVES)
+@pytest.mark.parametrize("noise", [0.0, 0.05])
+def test_where_nothing_changes_a_life_is_that_of_a_learner_who_notices_nothing(name, noise):
+    arm = PlanarArm(3, noise=noise)
+    taught = name == "sgim-d"
+    teachers = [PeriodicTeacher(demonstrations(ARM), stream(0, "teacher")) if taught else None for _ in range(2)]
+    thetas = [
+        live(watches(LIVES[name](arm, 1)), Changing(arm, "none", 0), 260, teacher=teacher)
+        for watches, teacher in zip((blind, lambda learner: learner), teachers, strict=True)
+    ]
+    assert np.array_equal(*thetas, equal_nan=True)
+
+
+def test_a_change_is_noticed_soon_and_told_since_when(changed):
+    learner, _ = changed
+    (change,) = learner.changes
+    assert 400 <= change.since <= 404
+    assert change.since < change.noticed <= 430
+    assert change.helpful > 0
+    assert str(change).startswith(f"since movement {change.since} outcomes are not what they were: ")
+    told = [event.reply for event in learner.events() if event.kind == Kind.CHANGED]
+    assert told == [str(change)]
+
+
+def test_after_a_small_change_a_learner_is_far_better_than_one_that_begins_and_one_that_notices_nothing(changed):
+    learner, robot = changed
+    anew = practice(robot, 4)
+    live(anew, Changing(PlanarArm(7), "offset-0.05", 0), 100)
+    deaf = blind(practice(robot, 3))
+    live(deaf, Changing(PlanarArm(7), "offset-0.05", 400), 500)
+    assert error(learner, robot) < 0.6 * min(error(anew, robot), error(deaf, robot))
+
+
+def test_if_nothing_holds_any_more_nothing_is_kept():
+    robot = Changing(ARM, "reversed", 200)
+    learner = practice(robot, 3)
+    live(learner, robot, 300)
+    (change,) = learner.changes
+    assert change.helpful == 0
+    assert str(change).endswith("nothing of before helps")
+    assert np.array_equal(learner.problem.memory.thetas, learner.memory.thetas[change.since :])
+
+
+def test_what_was_learnt_first_comes_back_with_the_first_robot():
+    robot = Changing(ARM, "undone", 200)
+    learner = practice(robot, 3)
+    live(learner, robot, 700 + 100)
+    _, back = learner.changes
+    assert 698 <= back.since <= 704
+    assert back.helpful > 100
+    assert error(learner, robot) < 0.01
+
+
+def test_noise_alone_is_no_change():
+    robot = Changing(PlanarArm(3, noise=0.05), "noise", 200)
+    learner = practice(robot, 3)
+    live(learner, robot, 400)
+    assert learner.changes == []
+
+
+@pytest.mark.parametrize("name", LIVES)
+def test_competence_falls_again_where_nothing_is_reached_any_more(name):
+    robot = Changing(ARM, "reversed", 200)
+    learner = LIVES[name](robot, 3)
+    live(learner, robot, 200)
+    reached = learner.memory.outcomes[-1]
+    babbling = learner.autonomous
+    assert babbling.competence(NO_CONTEXT, reached) == 0
+    live(learner, robot, 300)
+    assert learner.changes
+    assert learner.autonomous is not babbling
+    assert len(learner.problem.memory) < len(learner.memory) == 300
+    assert learner.autonomous.competence(NO_CONTEXT, reached) < 0
+
+
+@pytest.mark.parametrize("at_once", [1, 5])
+@pytest.mark.parametrize("name", LIVES)
+def test_a_life_through_a_change_is_repeated_exactly(name, at_once, tmp_path):
+    robot, saved = Changing(ARM, "offset-0.1", 150), tmp_path / "life.sqlite"
+    whole = LIVES[name](robot, 2)
+    shown = demonstrations(ARM)
+    teacher = PeriodicTeacher(shown, stream(0, "teacher")) if name == "sgim-d" else None
+    live(whole, robot, 240, at_once, teacher=teacher)
+    assert whole.changes
+    save_life(whole, saved)
+    again = LIVES[name](robot, 2)
+    teacher_again = PeriodicTeacher(shown, stream(0, "teacher")) if name == "sgim-d" else None
+    load_life(again, saved, teacher=teacher_again)
+    assert again.changes == whole.changes
+    first = live(whole, robot, 270, at_once, teacher=teacher)
+    assert np.array_equal(first, live(again, robot, 270, at_once, teacher=teacher_again), equal_nan=True)
+
+
+def test_movements_of_another_program_and_failures_count_and_a_change_among_them_is_noticed():
+    robot, rng = Changing(ARM, "mirrored", 0), stream(0, "elsewhere")
+    learner = practice(ARM, 0)
+    live(learner, Changing(ARM, "none", 0), 150)
+    for k in range(60):
+        learner.ask(NO_CONTEXT)
+        learner.tell_many([Failure("it slipped")])
+        theta = ARM.policies.sample(rng)
+        robot.made = k
+        learner.add(NO_CONTEXT, theta, robot.execute(NO_CONTEXT, theta, rng))
+    assert learner.changes[0].since in range(150, 156)
+
+
+def test_a_demonstration_after_a_change_is_imitated(changed):
+    robot = Changing(ARM, "offset-0.1", 150)
+    learner = LIVES["sgim-d"](robot, 2)
+    live(learner, robot, 240)
+    assert learner.changes
+    lesson = demonstrate(ARM, [0.3, 0.4])
+    learner.watch(lesson)
+    assert np.array_equal(learner.ask(NO_CONTEXT).theta, lesson.trajectory[-1])
+
+
+@pytest.mark.parametrize("change", ["none", "offset-0.05", "mirrored"])
+def test_a_simulator_helps_as_far_as_it_is_right(change):
+    there = Changing(ARM, change, 0)
+    simulated = practice(there, 5)
+    live(simulated, there, 300)
+    helped, alone = practice(ARM, 6, prior=simulated.memory), practice(ARM, 6)
+    for learner in (helped, alone):
+        live(learner, Changing(ARM, "none", 0), 60)
+    assert helped.begun == 0
+    assert len(helped.memory) == 60
+    ratio = error(helped, ARM) / error(alone, ARM)
+    assert ratio < (1.5 if change == "mirrored" else 0.5)
+
+
+def test_memory_and_prior_together_are_refused():
+    memory = practice(ARM, 0).memory
+    with pytest.raises(ValueError, match="give memory, exemplars of this robot, or prior"):
+        practice(ARM, 0, memory=memory, prior=memory)
+
+
+def test_the_inverse_model_of_the_paper_stays_to_the_letter():
+    learner = sagg_riac(ARM, 0, inverse=LocalInverse)
+    assert learner.watcher is None
+    assert learner.problem.remarks == ["changes of the robot are not noticed: LocalInverse does not say how sure it is"]
+
+
+def test_a_calibration_finds_offset_and_gain():
+    rng = stream(0, "calibration")
+    memory = executed(ARM, rng.uniform(0.2, 0.8, (300, 3)))
+    given = problem(ARM, memory=memory)
+    regime = Regime(LocalProcess(given).learnt(), Exemplars.of(memory))
+    now = Exemplars.of(memory, slice(100, 140))
+    now = now._replace(thetas=0.5 + (now.thetas - 0.5 - 0.04) / 0.9)  # movements of now that do what those did before
+    found = Calibration(regime, ARM.policies).fit(now)
+    assert np.abs(found.predict(now) - now.outcomes).max() < 0.02
+    assert found.p[:6] == pytest.approx([-0.1] * 3 + [0.04] * 3, abs=0.02)
