@@ -8,15 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from sgimd_torch.evaluation import Evaluation, evaluate
-from sgimd_torch.goals.regions import Region
 from sgimd_torch.record import Record
 from sgimd_torch.runs.build import RunParts
 from sgimd_torch.runs.config import OWN
+
+if TYPE_CHECKING:
+    from sgimd_torch.goals.regions import Region
 
 ByInverse = Mapping[str, Evaluation]
 """The evaluation of each inverse model, by name, the run's own inverse model first."""
