@@ -43,8 +43,7 @@ class Config:
         algorithm: learner, see below.
         seed: random seed; two runs with equal options and an equal seed are equal.
         movements: number of movements, rests included.
-        until: mean error, in the unit of T; the run ends early once the learner expects no larger one at the goals of
-            evaluation or, if the robot has none, at goals within reach; null: it never ends early.
+        until: mean error, in the unit of T, that ends the run once it is expected; null: none.
         teachers: names of teachers to ask; null: one with all demonstrations.
         out: folder for runs; a run with seed 3 goes to OUT/NAME/seed-003.
         name: name of the variant, NAME in the path of the run; null: the algorithm.
