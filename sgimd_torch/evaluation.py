@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 from bisect import bisect_left
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from sgimd_torch.environments.protocol import BatchEnvironment, Environment, execute_many, observed
 from sgimd_torch.files import read_npz, write_npz
 from sgimd_torch.parts import Inverse
-from sgimd_torch.spaces import Array, Box, check_count, check_vector, first_entry, stream
+from sgimd_torch.spaces import Array, Box, Estimate, check_count, check_vector, first_entry, stream
 
 SHIPPED = Path(__file__).with_name("data") / "benchmark.npz"
 TILES: Final = 358  # number of goals in the paper's benchmark
@@ -76,6 +76,7 @@ class Evaluation:
             there are no repeats.
         contexts: ``(n, context_dim)``, contexts of the movements.
         failed: ``(n,)``, whether the movement failed.
+        expected: ``(n,)``, errors that the inverse model expected; NaN if it does not say how sure it is.
     """
 
     errors: Array
@@ -84,6 +85,7 @@ class Evaluation:
     scatter: Array
     contexts: Array
     failed: NDArray[np.bool_]
+    expected: Array
 
     @property
     def mean_error(self) -> float:
@@ -194,7 +196,8 @@ def evaluate(
     else:
         given = environment.contexts.check("context", context)
         contexts = np.broadcast_to(given, (len(goals), environment.contexts.dim))
-    thetas = np.stack([estimate.theta for estimate in inverse.answer_many(contexts, goals)])
+    answers = inverse.answer_many(contexts, goals)
+    thetas, expected = np.stack([each.theta for each in answers]), expected_errors(answers, goals)
     copies = np.tile(thetas, (1 + repeats, 1))  # repeats come last, so that errors do not depend on their number
     landed = _landed(environment, np.tile(contexts, (1 + repeats, 1)), copies, seed, f"evaluation {step}", between)
     landed = landed.reshape(1 + repeats, *goals.shape)
@@ -205,7 +208,12 @@ def evaluate(
         bessel = np.sqrt(repeats / (repeats - 1))
         scatter = bessel * np.linalg.norm(again - again.mean(axis=0), axis=2).mean(axis=0)
     reached = np.where(np.isnan(outcomes), environment.rest, outcomes)
-    return Evaluation(np.linalg.norm(reached - goals, axis=1), thetas, outcomes, scatter, contexts, failed)
+    return Evaluation(np.linalg.norm(reached - goals, axis=1), thetas, outcomes, scatter, contexts, failed, expected)
+
+
+def expected_errors(answers: Sequence[Estimate], goals: Array) -> Array:
+    """Expected errors ``(n,)`` of answers to ``goals`` ``(n, outcome_dim)``; NaN: not known."""
+    return np.array([each.expected_error(goal) for each, goal in zip(answers, goals, strict=True)])
 
 
 def _landed(

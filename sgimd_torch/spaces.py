@@ -6,6 +6,7 @@ learning episode (context, policy, outcome). This module imports only numpy.
 
 from __future__ import annotations
 
+import math
 import reprlib
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
@@ -268,6 +269,7 @@ class Estimate(NamedTuple):
 
     ``expected`` ``(outcome_dim,)`` is the outcome that the inverse model expects of theta, and ``sd`` the standard
     deviation from it in each dimension, noise included, in the unit of T; None: the inverse model does not know.
+        estimate = learner.inverse(context, goal); estimate.expected, estimate.off, estimate.expected_error(goal)
     """
 
     theta: Array
@@ -276,6 +278,20 @@ class Estimate(NamedTuple):
     context: Array = np.zeros(0)
     expected: Array | None = None
     sd: float | None = None
+
+    @property
+    def off(self) -> float:
+        """Mean distance of the outcome of theta from ``expected``, in the unit of T; NaN: unknown."""
+        dim = self.outcomes.shape[1]
+        chi = math.sqrt(2) * math.exp(math.lgamma((dim + 1) / 2) - math.lgamma(dim / 2))  # its mean
+        return math.nan if self.sd is None else chi * self.sd
+
+    def expected_error(self, goal: Array) -> float:
+        """Expected distance of the outcome of theta from ``goal`` ``(outcome_dim,)``, in the unit of T; NaN: unknown.
+
+        It is exact if the outcome is expected at the goal, or is certain; else it is too large by at most a tenth.
+        """
+        return math.nan if self.expected is None else math.hypot(math.dist(self.expected, goal), self.off)
 
 
 @dataclass(frozen=True, eq=False)

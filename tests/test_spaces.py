@@ -7,6 +7,7 @@ from sgimd_torch.spaces import (
     Box,
     Demonstration,
     Episode,
+    Estimate,
     Move,
     check_count,
     check_vector,
@@ -134,3 +135,18 @@ def test_a_demonstration_that_cannot_be_right_is_refused_by_the_name_of_its_part
     Demonstration(**right)
     with pytest.raises(ValueError, match=message):
         Demonstration(**right | {part: value})
+
+
+@pytest.mark.parametrize("dim", [1, 2, 6])
+def test_an_estimate_says_how_far_its_outcome_may_be_off_and_from_the_goal(dim):
+    rng, sd = np.random.default_rng(0), 0.3
+    estimate = Estimate(THETA, THETA[None], np.zeros((1, dim)), expected=np.ones(dim), sd=sd)
+    outcomes = rng.normal(estimate.expected, sd, (40_000, dim))
+    assert estimate.off == pytest.approx(np.linalg.norm(outcomes - 1, axis=1).mean(), rel=0.02)
+    assert estimate.expected_error(np.ones(dim)) == estimate.off
+    for away in (0.1, 0.3, 1.0, 10.0):
+        goal = np.eye(dim)[0] * away + 1
+        found = np.linalg.norm(outcomes - goal, axis=1).mean()
+        assert 0.98 < estimate.expected_error(goal) / found < 1.11
+    unknown = estimate._replace(expected=None, sd=None)
+    assert np.isnan([unknown.off, unknown.expected_error(np.ones(dim))]).all()

@@ -115,7 +115,15 @@ def competence_map(ax: Axes, lows: Array, highs: Array, competences: Array, sect
     return drawn
 
 
-def misses(ax: Axes, goals: Array, errors: Array, space: Box, section: Section, most: float) -> None:
+def misses(
+    ax: Axes,
+    goals: Array,
+    errors: Array,
+    space: Box,
+    section: Section,
+    most: float,
+    label: str = "distance from goal to outcome",
+) -> None:
     """Goals of an evaluation, coloured by their error; if T has one dimension, the y axis shows the error instead.
 
     Args:
@@ -125,8 +133,9 @@ def misses(ax: Axes, goals: Array, errors: Array, space: Box, section: Section, 
         space: T.
         section: dimensions to show.
         most: error at the upper end of the colour scale.
+        label: name of the errors, without their unit.
     """
-    label = space.in_unit("distance from goal to outcome")
+    label = space.in_unit(label)
     if section.is_strip:
         ax.plot(goals[:, 0], errors, ".", color="#0072b2", markersize=4)
         ax.set(xlabel=space.axis(0), ylabel=label)

@@ -41,7 +41,7 @@ def layout(dims: Dims) -> dict[str, list[str]]:
     )
     words = ["demonstration INTEGER", "who TEXT", "strategy TEXT", "reply TEXT", "place INTEGER"]
     evaluated = ["movements INTEGER", "answer TEXT"]
-    numbers = ["mean_error REAL", "median_error REAL", "p90_error REAL", "noise_floor REAL", "goals_met INTEGER"]
+    numbers = ["mean_error", "median_error", "p90_error", "noise_floor", "expected_error"]
     predicted = [column for name in ("predicted", "epistemic", "aleatoric") for column in _vector(name, t)]
     learnt = ["held_out REAL", "relative_error REAL", "diverged INTEGER"]
     corners = [column for name in ("low", "high") for column in _vector(name, c + t)]
@@ -51,8 +51,8 @@ def layout(dims: Dims) -> dict[str, list[str]]:
         "events": ["movement INTEGER", "kind TEXT", "origin TEXT", *context, *theta, *goal, *outcome, *words],
         "demonstrations": [*context, *outcome, "n_joints INTEGER", "times BLOB", "trajectory BLOB"],
         "goals": ["goal INTEGER", *goal],
-        "evaluations": [*evaluated, *numbers],
-        "errors": [*evaluated, "goal INTEGER", "error REAL", "noise REAL", "failed INTEGER", *context],
+        "evaluations": [*evaluated, *(f"{name} REAL" for name in numbers), "goals_met INTEGER"],
+        "errors": [*evaluated, "goal INTEGER", "error REAL", "noise REAL", "failed INTEGER", "expected REAL", *context],
         "regions": ["movements INTEGER", "path TEXT", *corners, "attempts INTEGER", "goals INTEGER", *interest],
         "predictions": ["exemplar INTEGER", *outcome, *predicted],
         "refreshes": ["movements INTEGER", "exemplars INTEGER", "steps INTEGER", *learnt],

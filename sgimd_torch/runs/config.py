@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -25,7 +26,7 @@ THREADS: Final = "environment.threads"
 PLACE: Final = ("seed", "out", "name", "board", THREADS)  # seed, place, display and speed of a run
 EVALUATES: Final = ("evaluated_by", "repeats", "floor_at", "benchmark_crc32")  # equal options of all evaluations
 MAY_CHANGE: Final = (
-    *("movements", "out", "name", "board", "failures", "evaluate_at"),
+    *("movements", "until", "out", "name", "board", "failures", "evaluate_at"),
     *(*FILES, *EVALUATES, THREADS),
 )
 """Options that may change when a run is resumed, as they do not affect the learner. Files are compared by their
@@ -42,6 +43,7 @@ class Config:
         algorithm: learner, see below.
         seed: random seed; two runs with equal options and an equal seed are equal.
         movements: number of movements, rests included.
+        until: mean error, in the unit of T, that ends the run once it is expected; null: none.
         teachers: names of teachers to ask; null: one with all demonstrations.
         out: folder for runs; a run with seed 3 goes to OUT/NAME/seed-003.
         name: name of the variant, NAME in the path of the run; null: the algorithm.
@@ -65,6 +67,7 @@ class Config:
     algorithm: str = "practice"
     seed: int = 0
     movements: int = 5000
+    until: float | None = None
     teachers: tuple[str, ...] | None = None
     out: Path = Path("runs")
     name: str | None = None
@@ -91,6 +94,8 @@ class Config:
             value = getattr(self, name)
             if value is not None and value < least:
                 raise ValueError(f"{name} must be at least {least}, got {value}")
+        if self.until is not None and not 0 < self.until < math.inf:
+            raise ValueError(f"until must be an error above 0, in the unit of T, got {self.until}")
         if self.repeats == 1:
             raise ValueError("repeats must be 0 or at least 2, got 1; one outcome shows no scatter")
         for name in ("evaluate_at", "floor_at"):

@@ -55,6 +55,7 @@ def open_run(parts: RunParts, *, resume: bool, accept_loss: bool = False) -> tup
         "robot": type(robot).__name__,
         "words": words(config),
         "tolerance": parts.learner.problem.tolerance,
+        "met": None,
         "spaces": {n: [b.low.tolist(), b.high.tolist(), b.names, b.unit] for n, b in spaces.items()},
     }
     dims = robot.contexts.dim, robot.policies.dim, robot.outcomes.dim
@@ -110,7 +111,10 @@ def _reopened(
             record = _salvaged(path, "; ".join(damage.values()), accept_loss, notes)
         if record.movements > config.movements:
             raise RunError(f"{path} has {record.movements} movements already, {config.movements} were requested")
-        _forget_evaluations(record, config, anew=bool(others & {*EVALUATES}), notes=notes)
+        met = record.about.get("met")
+        if met and met[0] == record.movements and "until" not in others:
+            about["met"] = met
+        _forget_evaluations(record, config, ended_early=about["met"], anew=bool(others & {*EVALUATES}), notes=notes)
         for table in OF_MODEL:
             record.replace_rows(table, ())
         if "versions" in record.about:
@@ -136,16 +140,19 @@ def _salvaged(path: Path, damage: str, accept_loss: bool, notes: list[str]) -> R
     return record
 
 
-def _forget_evaluations(record: Record, config: Config, *, anew: bool, notes: list[str]) -> None:
+def _forget_evaluations(
+    record: Record, config: Config, *, ended_early: list[Any] | None, anew: bool, notes: list[str]
+) -> None:
     """Drop evaluations that are not requested, and all after the first missing one; with ``anew``, drop all."""
     made = list(dict.fromkeys(movements for movements, *_ in record.rows("evaluations")))
     if not made:  # then the settings may be lost
         return
     ended = record.about["settings"]["movements"]  # if this run ends later, the noise is not measured here
     longer = config.floor_at is None and ended != config.movements
-    kept, left = list[int](), config.evaluations
+    requested = sorted({*config.evaluations, *(ended_early or [])[:1]})
+    kept, left = list[int](), requested
     for each in made:
-        if anew or not config.due(each, config.evaluations) or (longer and each == ended):
+        if anew or not config.due(each, requested) or (longer and each == ended):
             continue
         if not config.due(each, left[:1]):
             break

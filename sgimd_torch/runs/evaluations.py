@@ -8,15 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from sgimd_torch.evaluation import Evaluation, evaluate
-from sgimd_torch.goals.regions import Region
 from sgimd_torch.record import Record
 from sgimd_torch.runs.build import RunParts
 from sgimd_torch.runs.config import OWN
+
+if TYPE_CHECKING:
+    from sgimd_torch.goals.regions import Region
 
 ByInverse = Mapping[str, Evaluation]
 """The evaluation of each inverse model, by name, the run's own inverse model first."""
@@ -94,9 +96,11 @@ class Evaluations:
         """Add evaluations to the record, and the current regions of the goal model."""
         for word, each in found.items():
             errors, met = each.errors, each.met(self.parts.benchmark.side / 2)
-            summary = each.mean_error, np.median(errors), np.quantile(errors, 0.9), each.noise_floor, met
+            quantiles = np.median(errors), np.quantile(errors, 0.9)
+            summary = each.mean_error, *quantiles, each.noise_floor, each.expected.mean(), met
             self.record.add_rows("evaluations", [(movements, word, *summary)])
-            columns = zip(errors.tolist(), each.scatter.tolist(), each.failed.astype(int), each.contexts, strict=True)
+            numbers = errors.tolist(), each.scatter.tolist(), each.failed.astype(int), each.expected.tolist()
+            columns = zip(*numbers, each.contexts, strict=True)
             rows = [(movements, word, k, *more, *context) for k, (*more, context) in enumerate(columns)]
             self.record.add_rows("errors", rows)
         self.record.add_rows("regions", [(movements, *_fields(region)) for region in self.parts.learner.regions])
@@ -104,7 +108,8 @@ class Evaluations:
 
 def _evaluation(numbers: np.ndarray) -> Evaluation:
     unknown = np.full((len(numbers), 0), np.nan)
-    return Evaluation(numbers[:, 0], unknown, unknown, numbers[:, 1], numbers[:, 3:], numbers[:, 2] > 0)
+    errors, noise, failed, expected, *_ = numbers.T
+    return Evaluation(errors, unknown, unknown, noise, numbers[:, 4:], failed > 0, expected)
 
 
 def _fields(region: Region) -> Iterator[Any]:

@@ -32,8 +32,7 @@ def overview(description: str | None) -> str:
         "names for the parts of a run; for a part of your own, type package.module:attribute:",
         *(_line(f"--{_PLACES.get(kind, kind)}", ", ".join(words)) for kind, words in WORDS.items() if kind in _PARTS),
         "",
-        "Parts have options, too, such as --goals.window 12. To see them, name the algorithm or a part before --help:",
-        "sgimd run --goals interest-map --help",
+        "Parts have options, too, such as --goals.window 12; to see them: sgimd run --goals interest-map --help",
     ]
     return "\n".join(lines)
 

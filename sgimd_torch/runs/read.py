@@ -39,7 +39,8 @@ class Run:
         robot: name of the environment's class.
         tolerance: distance, in the unit of T, at which a goal of the learner counts as met.
         spaces: boxes C, Pi and T, by the names "contexts", "policies" and "outcomes".
-        summary: numbers of "movements" and of "failed" movements, whether the run is "finished", and seconds by part.
+        summary: numbers of "movements" and of "failed" movements, whether the run is "finished", seconds by part, and
+            "expected", the mean error that the learner expected when ``--until`` ended the run, or None.
         changes: descriptions of the changes of the robot that the learner noticed.
         index: ``(n,)`` numbers of the movements, from 0.
         origin: ``(n,)`` origin of each movement, such as "local" or "imitate"; "" for a rest.
@@ -98,10 +99,9 @@ class Run:
         return float(found[0]) if len(found) else float("nan")
 
     def missed_by(self, movements: int, answer: str = OWN) -> tuple[Array, Array]:
-        """Errors ``(n_goals,)`` of an evaluation, and the contexts ``(n_goals, context_dim)`` of its goals."""
+        """Errors ``(n_goals,)`` of an evaluation, and those that the learner expected; NaN: it did not say."""
         now = (self.errors["movements"] == movements) & (self.errors["answer"] == answer)
-        contexts = [self.errors[f"context_{k}"][now] for k in range(self.spaces["contexts"].dim)]
-        return self.errors["error"][now], np.array(contexts).T.reshape(int(now.sum()), -1)
+        return self.errors["error"][now], self.errors["expected"][now]
 
     def own_goals(self) -> OwnGoals:
         """How nearly the learner met the goals that it chose.
@@ -154,7 +154,8 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         n = record.movements
     evaluated = found["evaluations"]["movements"]
     nothing = not shown and not np.isfinite(arrays["outcomes"]).any()  # the memory is empty, so there is no evaluation
-    finished = n == settings["movements"] and (settings["evaluate_at"] == [] or n in evaluated or nothing)
+    met = about.get("met") or [settings["movements"], None]
+    finished = n == met[0] and (settings["evaluate_at"] == [] or n in evaluated or nothing)
     return Run(
         path=path,
         config=settings,
@@ -168,6 +169,7 @@ def read_run(path: str | os.PathLike[str]) -> Run:
             "movements": n,
             "failed": int(arrays["failed"].sum()),
             "finished": bool(finished),
+            "expected": met[1],
             **about.get("seconds", {}),
         },
         **arrays,

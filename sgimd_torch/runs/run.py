@@ -10,6 +10,7 @@ import time
 import traceback
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from functools import partial
 from typing import Final, Protocol, Self
 
@@ -131,7 +132,9 @@ class Life:
             if last.failed.any():
                 found += f" ({last.failed.sum()} of {len(last.failed)} movements of the evaluation failed)"
         failed = f" ({self.failed} failed)" if self.failed else ""
-        return f"{self.parts.config.directory}: {self.movements} movements{failed}, {found}"
+        met = self.record.about["met"]
+        early = f", ended early as it expected {self.parts.environment.outcomes.amount(met[1], '.4f')}" if met else ""
+        return f"{self.parts.config.directory}: {self.movements} movements{failed}, {found}{early}"
 
     def go_on(self, stopping: Stopping) -> None:
         """Make all movements, or stop after the movement during which ``stopping`` has heard a signal."""
@@ -174,6 +177,8 @@ class Life:
             for episode in iter(following, None):
                 self._after(episode)
                 yield episode
+                if self._ends_early():
+                    return
 
     @property
     def _all_told(self) -> bool:
@@ -243,6 +248,20 @@ class Life:
             self._begin()
         if not self.replaying and time.monotonic() - self._committed >= COMMIT_EVERY:
             self.commit()
+
+    def _ends_early(self) -> bool:
+        """Whether --until ends the run now; then there is a last evaluation."""
+        config = self.parts.config
+        if config.until is None or self.replaying or not self._all_told or self.movements >= config.movements:
+            return False
+        from sgimd_torch.runs.until import ends_now  # loaded here, as few runs end early
+
+        with self.seconds.of("learner"):
+            ends = ends_now(self.parts, self.record, self.movements)
+        if ends and config.evaluations:
+            self.evaluations.parts = replace(self.parts, config=replace(config, movements=self.movements))
+            self._evaluate()
+        return ends
 
     def _evaluate(self) -> None:
         with self.seconds.of("evaluation"):

@@ -1,5 +1,6 @@
-"""Ask a run for movements: theta for each goal, and the outcome that the run expects.
+"""Ask a run for movements: theta for each goal, the outcome that the run expects, and how far it may be off.
 
+That is the mean distance from the expected outcome, noise included, in the unit of T.
 The learner repeats its record, then its inverse model answers. With --execute, the robot of the run executes each
 answer. With --out, the answers are a table for other programs; with --trajectory, the joints over time.
 
@@ -30,7 +31,7 @@ from sgimd_torch.runs.process import parser_of
 from sgimd_torch.spaces import Array, Box, stream
 
 Answer = dict[str, Array]
-"""Vectors of an answer, by the names "goal", "context", "theta", "expected" and "reached"."""
+"""Vectors of an answer, by the names "goal", "context", "theta", "expected", "off" and "reached"."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -53,7 +54,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         for answer in answers:
             print("; ".join(f"{name} {_text(value)}" for name, value in answer.items() if len(value)))
         return 0
-    heads = [f"{name}_{k}" for name, value in answers[0].items() for k in range(len(value))]
+    heads = [name if name == "off" else f"{name}_{k}" for name, value in answers[0].items() for k in range(len(value))]
     _write(options.out, heads, (np.concatenate([*answer.values()]) for answer in answers))
     print(f"{len(answers)} answers: {options.out}")
     return 0
@@ -85,11 +86,15 @@ def _answers(
         raise ValueError(f"{parts.config.directory} has an empty memory, so it infers no movement")
     for k, each in enumerate(goals):
         goal = robot.outcomes.check("goal", each, "it is a point of T, such as 0.3,0.2")
-        theta = inverse(context, goal).theta
+        estimate = inverse(context, goal)
+        theta, expected = estimate.theta, estimate.expected
         answer = {"goal": goal, "context": context, "theta": theta}
-        expected = inverse.predict(context, theta)
+        if expected is None:
+            expected = inverse.predict(context, theta)
         if expected is not None:
             answer["expected"] = expected
+        if estimate.sd is not None:
+            answer["off"] = np.array([estimate.off])
         if execute:
             answer["reached"] = robot.execute(context, theta, stream(parts.config.seed, "ask", k))
         yield answer

@@ -46,12 +46,14 @@ def results(variants: Sequence[Variant]) -> list[Column]:
         return [variant.at(variant.last, column) for variant in variants]
 
     if any(variant.last for variant in variants):
+        expected = at_last("expected_error")
         early = [variant.at(EARLY) if variant.last > EARLY else None for variant in variants]
         found = [
             Column("seeds", [point(len(variant.used)) for variant in variants], ".0f"),
             Column("movements", [point(variant.last) if variant.last else None for variant in variants], ".0f"),
             *([Column(unit(f"error at {EARLY}"), early)] if any(early) else []),
             Column(unit("error"), at_last("mean_error")),
+            *([Column(unit("expected error"), expected)] if any(expected) else []),
             Column(unit("median"), at_last("median_error")),
             Column(unit("noise floor"), [each and point(each.value) for each in at_last("noise_floor")]),
         ]

@@ -159,11 +159,18 @@ class Variant:
         return np.array(shown, dtype=np.float64).reshape(len(shown), self.landed.shape[1])
 
     @cached_property
-    def misses(self) -> tuple[Array, Array]:
-        """Goals ``(n, outcome_dim)`` of the last evaluation, and their errors ``(n,)``, means over seeds."""
+    def misses(self) -> tuple[Array, Array, Array]:
+        """Goals ``(n, outcome_dim)`` of the last evaluation, their errors ``(n,)``, and those that the learners
+        expected, NaN if they did not say; all are means over seeds."""
         goals = self.typical.benchmark
-        errors = [run.missed_by(self.last)[0] for run in self.used if np.array_equal(run.benchmark, goals)]
-        return goals, np.mean(errors, axis=0)
+        both = [run.missed_by(self.last) for run in self.used if np.array_equal(run.benchmark, goals)]
+        found, expected = np.mean(both, axis=0)
+        return goals, found, expected
+
+    @property
+    def expects(self) -> bool:
+        """Whether the learners said at the last evaluation which errors they expected."""
+        return bool(self.last) and bool(np.isfinite(self.misses[2]).all())
 
     @property
     def typical(self) -> Run:

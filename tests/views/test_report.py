@@ -24,7 +24,7 @@ from sgimd_torch.views.report.page import page
 from sgimd_torch.views.statistics import interquartile_mean
 from sgimd_torch.views.variants import Variant
 
-FIGURES = [f"{what} of SGIM-D" for what in ("Error curve", "Landing points", "Misses", "Regions")]
+FIGURES = [f"{what} of SGIM-D" for what in ("Error curve", "Landing points", "Misses", "Expected misses", "Regions")]
 ODD = "<b>&'$x\" "
 
 
@@ -79,8 +79,8 @@ def test_a_page_is_one_file_that_asks_for_nothing_else(pages, name):
 
 def test_every_figure_is_an_image_with_words_for_those_who_do_not_see_it(pages):
     assert alts(pages["one"]) == FIGURES
-    # all curves; of each variant its curve, where it landed if it moved, regions of one
-    assert len(alts(pages["many"])) == 1 + 3 + 3 + 2 + 1
+    # all curves; of each variant its curve and misses, where it landed if it moved, expected misses if it knew, regions
+    assert len(alts(pages["many"])) == 1 + 3 + 3 + 2 + 2 + 1
     assert all(alts(pages["many"]))
     source = next(given["src"] for name, given in Page(pages["one"]).elements if name == "img")
     with Image.open(io.BytesIO(base64.b64decode(source.partition(",")[2]))) as picture:

@@ -1,7 +1,7 @@
 """Write one page about one run, or about many runs side by side: a single file that opens without network.
 
-The page shows error curves with intervals over seeds, outcomes, errors by goal and the interest map. It has tables of
-results, settings and versions, and the commands that repeat each run. It lists unfinished runs.
+The page shows error curves with intervals over seeds, outcomes, errors by goal, found and expected, and the interest
+map. It has tables of results, settings and versions, and the commands that repeat each run. It lists unfinished runs.
 """
 
 from __future__ import annotations

@@ -167,13 +167,13 @@ def landing(figure: Figure, variant: Variant, plane: Box) -> None:
 
 
 @png
-def misses(figure: Figure, variant: Variant) -> None:
-    """Goals of the last evaluation, coloured by their errors."""
-    goals, errors = variant.misses
-    panels = sections(variant.space)
-    most = max(float(np.quantile(errors, 0.95)), 1e-12)
+def misses(figure: Figure, variant: Variant, *, expected: bool = False) -> None:
+    """Goals of the last evaluation, coloured by their errors, or in the same colours by those that were expected."""
+    goals, found, foreseen = variant.misses
+    panels, drawn = sections(variant.space), (foreseen, "expected error") if expected else (found, "error")
+    most = max(float(np.nanquantile([found, foreseen], 0.95)), 1e-12)
     for ax, section in zip(_panels(figure, panels), panels, strict=True):
-        draw_misses(ax, goals, errors, variant.space, section, most)
+        draw_misses(ax, goals, drawn[0], variant.space, section, most, drawn[1])
 
 
 def has_regions(run: Run) -> bool:

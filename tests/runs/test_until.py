@@ -1,0 +1,129 @@
+"""``sgimd run --until``: a run ends once the learner expects small errors, and stays ended; the errors are found."""
+
+import numpy as np
+import pytest
+
+from runs import about_of, content_of, end, settle, stopped_at
+from sgimd_torch.evaluation import evaluate
+from sgimd_torch.runs.build import build
+from sgimd_torch.runs.command_line import main
+from sgimd_torch.runs.config import Config
+from sgimd_torch.runs.load import load_learner
+from sgimd_torch.runs.process import command
+from sgimd_torch.runs.read import finished, read_run
+
+ARM = "--environment planar-arm-7 --seed 3 --movements 260 --evaluate-at 120"
+
+
+def go(out, *words):
+    return command(main, [*ARM.split(), f"--out={out}", *words])
+
+
+def path_of(out):
+    return out / "practice" / "seed-003"
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """The content of a run of all movements."""
+    out = tmp_path_factory.mktemp("whole")
+    assert go(out) == 0
+    return content_of(path_of(out))
+
+
+@pytest.fixture(scope="module")
+def early(tmp_path_factory):
+    """A run that ended early."""
+    out = tmp_path_factory.mktemp("early")
+    assert go(out, "--until=0.06") == 0
+    return out
+
+
+def test_a_run_ends_as_soon_as_the_expected_error_is_small_and_is_finished(early, whole):
+    run = read_run(path_of(early))
+    n = run.summary["movements"]
+    assert (n, run.summary["finished"], run.config["movements"]) == (150, True, 260)
+    assert run.evaluation["movements"].tolist() == [120, n]  # the last evaluation is that of the end, with its noise
+    assert np.isfinite(run.evaluation["noise_floor"]).tolist() == [False, True]
+    assert run.summary["expected"] == pytest.approx(run.at(n, "expected_error"), rel=1e-9)  # at the same goals
+    assert run.summary["expected"] <= 0.06
+    assert content_of(path_of(early))["events"] == whole["events"][:n]  # looking changes nothing
+    config = Config(
+        seed=3, movements=260, until=0.06, evaluate_at=(120,), out=early, parts={"environment": "planar-arm-7"}
+    )
+    assert finished(config)
+
+
+def test_the_expected_error_is_the_one_that_is_found(early):
+    run = read_run(path_of(early))
+    n = run.summary["movements"]
+    assert 0.8 < run.at(n, "expected_error") / run.at(n) < 1.25
+    found, expected = run.missed_by(n)
+    assert np.corrcoef(found, expected)[0, 1] > 0.5  # goal by goal, too
+
+
+@pytest.mark.parametrize("words", [[], ["--movements=400"]])
+def test_a_run_that_ended_early_stays_ended_when_it_is_resumed(early, words, capsys):
+    before = content_of(path_of(early))
+    assert go(early, "--until=0.06", "--resume", *words) == 0
+    assert "150 movements, mean error" in capsys.readouterr().out
+    assert content_of(path_of(early)) == before
+    assert read_run(path_of(early)).summary["finished"]
+
+
+def test_without_its_limit_or_with_a_lower_one_the_run_goes_on_as_if_it_had_never_ended(tmp_path, whole):
+    assert go(tmp_path, "--until=0.06") == 0
+    assert go(tmp_path, "--until=1e-9", "--resume") == 0
+    assert content_of(path_of(tmp_path)) == whole
+    assert about_of(path_of(tmp_path))["met"] is None
+
+
+def test_a_run_killed_at_its_end_ends_there_when_it_is_resumed(early, tmp_path):
+    words = [*ARM.split(), f"--out={tmp_path}", "--until=0.06"]
+    end(stopped_at(150, *words))
+    assert not read_run(path_of(tmp_path)).summary["finished"]
+    assert command(main, [*words, "--resume"]) == 0
+    assert content_of(path_of(tmp_path)) == content_of(path_of(early))
+
+
+def test_movements_that_are_lost_after_the_end_are_made_again(early, tmp_path):
+    assert go(tmp_path, "--until=0.06", "--movements=100") == 0
+    settle(path_of(tmp_path), met=[150, 0.05])
+    assert go(tmp_path, "--until=0.06", "--resume") == 0
+    assert content_of(path_of(tmp_path))["events"] == content_of(path_of(early))["events"]
+
+
+def test_eight_robots_stop_together_after_the_group_that_passes_the_moment_of_a_look(tmp_path):
+    assert go(tmp_path, "--until=0.3", "--at-once=8") == 0
+    n = read_run(path_of(tmp_path)).summary["movements"]
+    assert 50 <= n < 260
+    assert n % 50 < 8
+
+
+def test_a_robot_without_goals_of_evaluation_is_asked_about_goals_within_reach(tmp_path, own):
+    words = ["--environment=sliders:Slider", "--movements=200", "--evaluate-at=[]", f"--out={tmp_path}"]
+    assert command(main, [*words, "--until=10"]) == 0
+    assert read_run(tmp_path / "practice" / "seed-000").summary["movements"] == 50
+
+
+@pytest.mark.parametrize("until", ["0", "-1", "nan", "inf", "soon", "0.1,0.2"])
+def test_a_limit_that_is_no_error_is_refused_in_a_line(tmp_path, capsys, until):
+    with pytest.raises(SystemExit):
+        main([*ARM.split(), f"--out={tmp_path}", f"--until={until}"])
+    said = capsys.readouterr().err.splitlines()
+    assert said[0].startswith(("error: until must be an error above 0", "error: --until must be a number"))
+    assert len(said) == 2
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_learner_that_does_not_know_how_sure_it_is_cannot_end_early(tmp_path, capsys):
+    assert go(tmp_path, "--until=0.1", "--inverse=nearest") == 2
+    assert "NearestNeighbour does not" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_loaded_learner_expects_what_the_run_expected(early):
+    learner, run = load_learner(path_of(early)), read_run(path_of(early))
+    arm = build(Config(parts={"environment": "planar-arm-7"})).environment
+    expected = evaluate(learner.inverse, arm, run.benchmark, 3, 150, repeats=0).expected
+    assert expected.tolist() == run.missed_by(150)[1].tolist()
