@@ -115,7 +115,7 @@ def test_latex_needs_no_package_and_no_sign_of_a_name_is_a_command(copied, capsy
     (copied / "sgim-d").rename(copied / "a_b&50%")
     assert table(copied, "--at", 40, "--baseline", "random", "--format", "latex") == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == r"\begin{tabular}{lrrrrrrrr}"
+    assert lines[0] == r"\begin{tabular}{lrrrrrrrrr}"
     assert lines[-2:] == [r"\hline", r"\end{tabular}"]
     (odd,) = [line for line in lines if line.startswith(r"a\_b\&50\% & 1 & 40 & ")]
     assert odd.count(" & ") == 8
