@@ -43,11 +43,7 @@ class Config:
         algorithm: learner, see below.
         seed: random seed; two runs with equal options and an equal seed are equal.
         movements: number of movements, rests included.
-<<<<<<< HEAD
         until: mean error (unit of T) that ends the run once it is expected; null: none.
-=======
-        until: mean error, in the unit of T, that ends the run once expected; null: none.
->>>>>>> h-changes
         teachers: names of teachers to ask; null: one with all demonstrations.
         out: folder for runs; a run with seed 3 goes to OUT/NAME/seed-003.
         name: name of the variant, NAME in the path of the run; null: the algorithm.

@@ -118,7 +118,7 @@ def test_latex_needs_no_package_and_no_sign_of_a_name_is_a_command(copied, capsy
     assert lines[0] == r"\begin{tabular}{lrrrrrrrrr}"
     assert lines[-2:] == [r"\hline", r"\end{tabular}"]
     (odd,) = [line for line in lines if line.startswith(r"a\_b\&50\% & 1 & 40 & ")]
-    assert odd.count(" & ") == 8
+    assert odd.count(" & ") == 9
     assert odd.endswith(r" \\")
     ours, theirs = (
         read_run(copied / name / "seed-000").answers["own"]["mean_error"][-1] for name in ("a_b&50%", "random")
