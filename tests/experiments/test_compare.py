@@ -277,7 +277,7 @@ def test_tiles_of_the_benchmark_that_were_reached_are_counted_once():
 def run_with(origins, goals):
     nothing = np.empty((len(goals), 0))
     return Run(
-        *(Path("nowhere"), {}, {}, {}, "Robot", [], {}, {}),
+        *(Path("nowhere"), {}, {}, {}, "Robot", [], {}, {}, []),
         *(np.arange(len(goals)), np.array(origins), np.full(len(goals), -1)),
         *(nothing, nothing, np.array(goals, dtype=np.float64), nothing, {"own": {}}),
     )

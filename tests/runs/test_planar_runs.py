@@ -53,7 +53,8 @@ def test_every_algorithm_lives_and_writes_a_whole_run_directory(tmp_path, few, c
     assert run.outcomes.shape == (70, 2)
     mapped = algorithm in ("sagg-riac", "sgim-d") or algorithm.startswith(("sgim-im", "sgim-acts"))
     assert (run.regions is not None) == mapped
-    assert {*run.evaluation} == {"movements", *("mean_error", "median_error", "p90_error", "noise_floor", "goals_met")}
+    numbers = ("mean_error", "median_error", "p90_error", "noise_floor", "expected_error", "goals_met")
+    assert {*run.evaluation} == {"movements", *numbers}
     # Observation and imitation have seen nothing before movement 30, so they have nothing to be evaluated by after 20.
     wanted = [40, 70] if algorithm in ("observation", "imitation") else [20, 40, 70]
     assert run.evaluation["movements"].tolist() == wanted
