@@ -50,6 +50,7 @@ PRACTICE = {
     "budget": 1,
     "global_range": (0.02, 0.3),
     "explore": "returning",
+    "explore.first": 0,
     "goals": "within-reach",
     "inverse": "among-effects",
     "search": "vary",

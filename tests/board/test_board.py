@@ -44,7 +44,8 @@ def evaluation(errors):
     """Of goals that were missed by ``errors``; nothing else is known."""
     errors = np.array(errors)
     nothing = np.full((len(errors), 0), np.nan)
-    return Evaluation(errors, nothing, nothing, np.full(len(errors), 0.01), nothing, errors < 0)
+    unknown = np.full(len(errors), np.nan)
+    return Evaluation(errors, nothing, nothing, np.full(len(errors), 0.01), nothing, errors < 0, unknown)
 
 
 def interest_map(n=400):
