@@ -225,6 +225,7 @@ def hparams_of(directory):
     return values, [info.name.tag for info in about.metric_infos]
 
 
+@pytest.mark.slow
 def test_hyperparameters_of_a_sweep_are_what_tells_its_runs_apart_defaults_included(own):
     words = "--environment planar-arm-7 --movements 50 --seeds 0 --repeats 0 --board true --out sweep"
     vary = ["--vary", "algorithm=sagg-riac,practice", "--vary", "budget=1,15"]  # 1 is the default of practice

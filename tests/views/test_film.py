@@ -326,6 +326,7 @@ PUCK = "--environment mujoco --environment.model push.xml --environment.outcome 
 PUCK += " --environment.context body:puck:x:.1:.2,body:puck:y:.1:.2 --environment.low=-.5,-.5 --environment.high .6,.6"
 
 
+@pytest.mark.slow
 def test_a_robot_from_a_file_is_filmed_in_space_and_without_opengl_in_the_plane(own):
     (own / "push.xml").write_text(PUSHING.format(""))
     live(f"{PUCK} --algorithm random --movements 20 --evaluate-at [] --out runs")
