@@ -145,7 +145,8 @@ class Notice:
             return 0
         rows = np.arange(max(n - m, n - _TESTED), n)
         told, before = Exemplars.of(memory, rows), Regime(learnt, Exemplars.of(memory, slice(n - m)))
-        as_it_was, failed = before.errors(told), before.predict(told)[1] * _BAD * memory.outcome_dim
+        expected, variances, _ = before.predict(told)
+        as_it_was, failed = squared(expected - told.outcomes), variances * _BAD * memory.outcome_dim
         # If nothing had changed, both would predict; the first errs more where noise has grown.
         nulls = Regime(learnt, Exemplars.of(memory)).left_out(rows)[0], as_it_was
         alone, _ = Regime(learnt, told).left_out(np.arange(len(rows)))
