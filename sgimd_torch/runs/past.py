@@ -12,7 +12,9 @@ from typing import Final
 
 import numpy as np
 
+from sgimd_torch.catalogue.options import read
 from sgimd_torch.environments.protocol import Environment
+from sgimd_torch.files import check_regular
 from sgimd_torch.learner.events import Kind
 from sgimd_torch.memory import Memory
 from sgimd_torch.record import Record, RunError
@@ -29,6 +31,7 @@ def past_of(path: Path, robot: Environment) -> Memory:
         ValueError: the file is damaged or has no movements, or its robot has other dimensions, units or bounds.
         OSError: the file cannot be read.
     """
+    check_regular(path)
     with path.open("rb") as file:
         recorded = file.read(len(_SQLITE)) == _SQLITE
     found = list(_recorded(path, robot) if recorded else _listed(path, robot))
@@ -80,7 +83,7 @@ def _listed(path: Path, robot: Environment) -> Iterator[Exemplar]:
         raise RunError(f"{path} {why}; this robot needs {', '.join(each for names in wanted for each in names)}")
     for number, row in enumerate(rows, 2):
         try:
-            context, theta, outcome = (np.array([float(row[each]) for each in names]) for names in wanted)
-        except (TypeError, ValueError) as error:
+            context, theta, outcome = (np.array([read(row[each] or "", float) for each in names]) for names in wanted)
+        except ValueError as error:
             raise RunError(f"{path}: line {number} is no movement of {sum(map(len, wanted))} numbers") from error
         yield context, theta, outcome

@@ -1,6 +1,7 @@
 """A run that begins with the movements of another robot, and a run whose robot changes, on disk."""
 
 import csv
+import os
 
 import pytest
 
@@ -91,6 +92,13 @@ def other(tmp_path, past, how):
             lines = table(path, past).read_text().splitlines()
             path.write_text("\n".join([*lines[:3], lines[3].replace("0.", "x.", 1), *lines[4:]]))
             return path, "line 4 is no movement of 9 numbers"
+        case "underscore":
+            lines = table(path, past).read_text().splitlines()
+            path.write_text("\n".join([*lines[:3], lines[3].replace("0.", "0_0.", 1), *lines[4:]]))
+            return path, "line 4 is no movement of 9 numbers"
+        case "pipe":
+            os.mkfifo(path)
+            return path, "is a pipe or a device, not a file"
         case "outside":
             lines = table(path, past).read_text().splitlines()
             path.write_text("\n".join([*lines, ",".join(["5"] * 9)]))
@@ -111,6 +119,8 @@ HOW = (
     "columns",
     "more columns",
     "text",
+    "underscore",
+    "pipe",
     "outside",
     "bytes",
     "missing",
