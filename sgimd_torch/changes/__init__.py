@@ -37,24 +37,38 @@ def watched(begin: Begin, seed: int, memory: Memory | None, prior: Memory | None
         prior: exemplars of another robot, such as a simulator; they count as far as they hold. None: no exemplars.
 
     Raises:
-        ValueError: both ``memory`` and ``prior`` are given.
+        ValueError: both ``memory`` and ``prior`` are given, or ``prior`` to a learner that cannot notice changes.
     """
     if memory is not None and prior is not None:
         raise ValueError("give memory, exemplars of this robot, or prior, exemplars of another robot; got both")
     learner = begin(seed, memory if prior is None else prior)
-    if _process_of(learner) is not None:
-        learner.watcher = Watcher(begin, learner, prior)
-    else:
-        name = type(learner.inverse).__name__
-        learner.problem.remarks.append(f"changes of the robot are not noticed: {name} does not say how sure it is")
+    learner.watcher = Watcher(begin, learner, prior)
+    check_watcher(learner)
     return learner
+
+
+def check_watcher(learner: Learner) -> None:
+    """Take its watcher from a learner that cannot notice changes, with a remark.
+
+    Raises:
+        ValueError: the learner has a prior, which would then count for good.
+    """
+    if not isinstance(learner.watcher, Watcher):
+        return
+    why = f"{type(learner.inverse).__name__} does not say how sure it is" if _process_of(learner) is None else ""
+    if why := why or ("a forward model cannot begin again" if learner.problem.trained else ""):
+        if learner.watcher.prior is not None:
+            needed = "an inverse model that says how sure it is, such as process, and no forward model"
+            raise ValueError(f"prior (--begin-with) needs {needed}, but {why}; was another --inverse meant?")
+        learner.watcher = None
+        learner.problem.remarks.append(f"changes of the robot are not noticed: {why}")
 
 
 class Watcher:
     """Notices changes of the robot of a ``learner``. With a ``prior``, the learner's memory becomes empty."""
 
     def __init__(self, begin: Begin, learner: Learner, prior: Memory | None) -> None:
-        self._begin, self._learner, self._prior, self._seed = begin, learner, prior, learner.problem.seed
+        self._begin, self._learner, self.prior, self._seed = begin, learner, prior, learner.problem.seed
         self._notice: Notice | None = None
         if prior is not None:
             learner.memory, learner.begun = Memory(*learner.problem.dims), 0
@@ -64,18 +78,18 @@ class Watcher:
         """Compare an outcome, which is not in memory yet, with what is expected."""
         learner, process = self._learner, _process_of(self._learner)
         self._numbers.append(max(0, learner.movements - 1))
-        if process is None or (self._prior is None and len(process.memory) < _FIRST):
+        if process is None or (self.prior is None and len(process.memory) < _FIRST):
             return
         if self._notice is None:
             from sgimd_torch.changes.notice import Notice  # the first movements of a life do not need it
 
-            self._notice = Notice(learner.problem, learner.memory, self._prior)
+            self._notice = Notice(learner.problem, learner.memory, self.prior)
         self._notice.expect(process, context, theta, outcome)
 
     def look(self) -> tuple[Learner, Change | None] | None:
         """A learner to go on as, and the change if a new one was noticed; None to go on."""
         learner, process = self._learner, _process_of(self._learner)
-        if self._notice is None or process is None or learner.problem.trained:
+        if self._notice is None or process is None:
             return None
         found = self._notice.look(process)
         if found is None:

@@ -11,6 +11,7 @@ from functools import partial
 from typing import Any
 
 from sgimd_torch.catalogue import called, function_of, load_word
+from sgimd_torch.changes import check_watcher
 from sgimd_torch.environments.protocol import Environment, FromFiles
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.files import checksum
@@ -107,6 +108,7 @@ def build(config: Config) -> RunParts:
         name = type(learner.inverse).__name__
         raise ValueError(f"--until needs an inverse model that says how sure it is, such as process; {name} does not")
     _answers(config, learner)  # made now, so that their remarks are among the notes
+    check_watcher(learner)  # an answer may have a forward model
     return RunParts(
         config=config,
         task=task,

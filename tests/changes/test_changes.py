@@ -12,6 +12,7 @@ from sgimd_torch.changes.calibration import Calibration
 from sgimd_torch.changes.regimes import Exemplars, Regime
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import evaluate
+from sgimd_torch.forward_model.search import GradientSearch
 from sgimd_torch.inverses.local import LocalInverse
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner.events import Kind
@@ -189,10 +190,19 @@ def test_memory_and_prior_together_are_refused():
         practice(ARM, 0, memory=memory, prior=memory)
 
 
-def test_the_inverse_model_of_the_paper_stays_to_the_letter():
-    learner = sagg_riac(ARM, 0, inverse=LocalInverse)
+UNWATCHED = {
+    "LocalInverse does not say how sure it is": {"inverse": LocalInverse},
+    "a forward model cannot begin again": {"search": GradientSearch},
+}
+
+
+@pytest.mark.parametrize("why", UNWATCHED)
+def test_who_cannot_begin_again_notices_nothing_and_refuses_a_prior_that_would_count_for_good(why):
+    learner = sagg_riac(ARM, 0, **UNWATCHED[why])
     assert learner.watcher is None
-    assert learner.problem.remarks == ["changes of the robot are not noticed: LocalInverse does not say how sure it is"]
+    assert learner.problem.remarks == [f"changes of the robot are not noticed: {why}"]
+    with pytest.raises(ValueError, match=rf"prior \(--begin-with\) needs .*{why}.*; was another --inverse meant"):
+        sagg_riac(ARM, 0, prior=executed(ARM, [[0.5, 0.5, 0.5]]), **UNWATCHED[why])
 
 
 def test_a_calibration_finds_offset_and_gain():

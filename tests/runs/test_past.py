@@ -143,6 +143,14 @@ def test_an_algorithm_that_does_not_notice_changes_begins_with_nothing(past, tmp
     assert "--begin-with: algorithm random does not learn from another robot" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("options", [("--inverse", "nearest"), ("--evaluated-by", "own,model")])
+def test_a_learner_that_cannot_begin_again_begins_with_nothing(options, past, tmp_path, capsys):
+    assert go(tmp_path / "out", *options, "--begin-with", past) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "prior (--begin-with) needs an inverse model that says how sure it is" in line
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_change_is_said_recorded_and_reported(module, capsys):
     where = module(
         "slipping",
