@@ -53,13 +53,16 @@ def check_watcher(learner: Learner) -> None:
     Raises:
         ValueError: the learner has a prior, which would then count for good.
     """
-    if not isinstance(learner.watcher, Watcher):
+    if _process_of(learner) is None:
+        why = f"{type(learner.inverse).__name__} does not say how sure it is"
+    elif learner.problem.trained:
+        why = "a forward model cannot begin again"
+    else:
         return
-    why = f"{type(learner.inverse).__name__} does not say how sure it is" if _process_of(learner) is None else ""
-    if why := why or ("a forward model cannot begin again" if learner.problem.trained else ""):
-        if learner.watcher.prior is not None:
-            needed = "an inverse model that says how sure it is, such as process, and no forward model"
-            raise ValueError(f"prior (--begin-with) needs {needed}, but {why}; was another --inverse meant?")
+    if isinstance(learner.watcher, Watcher) and learner.watcher.prior is not None:
+        needed = "an inverse model that says how sure it is, such as process, and no forward model"
+        raise ValueError(f"prior (--begin-with) needs {needed}, but {why}; was another --inverse meant?")
+    if learner.watcher is not None:
         learner.watcher = None
         learner.problem.remarks.append(f"changes of the robot are not noticed: {why}")
 
