@@ -144,14 +144,14 @@ def changes(found: Evidence) -> list[Claim]:
 
     shifts = ("offset-0.1", "offset-0.02", "gain")
     return [
-        Claim("Offset, gain, and a change undone: at most half the error of starting anew at 100, 250: ratios ≤ 0.50",
+        Claim("Offset, gain, undone: half the error of starting anew at 100, 250: ratios ≤ 0.50",
               parts(0.5, *shifts, "undone", times=(100, 250))),
-        Claim("Never worse than starting anew at 100 to 1000, ratios ≤ 1.05: offset, gain, gradual",
+        Claim("Never worse than anew at 100 to 1000: ratios ≤ 1.05: offset, gain, gradual",
               parts(1.05, *shifts, "gradual")),
         *(Claim(f"... {change}", parts(1.05, change)) for change in ("stuck", "undone", "mirrored")),
-        Claim("Noise three times as large: nor than a learner that notices no change: ratios ≤ 1.05",
+        Claim("Noise: nor than a learner that notices nothing: ratios ≤ 1.05",
               parts(1.05, "noise", other=BLIND)),
-        Claim("Begun with a simulator: half the error at 50, 100: ratios ≤ 0.50", begun(0.5, GOES_ON, *BEGUN[:2])),
+        Claim("Simulator: half the error at 50, 100: ratios ≤ 0.50", begun(0.5, GOES_ON, *BEGUN[:2])),
         Claim("... never worse: ratios ≤ 1.03", begun(1.03, GOES_ON, *BEGUN)),
         Claim("... nor with a wrong, mirrored one", begun(1.03, WRONG, *BEGUN)),
     ]  # fmt: skip
