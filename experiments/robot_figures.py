@@ -5,6 +5,7 @@ figure = shares(Evidence.of(Path("results")))
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -19,15 +20,11 @@ from random_robots import COUNTS, FAMILIES, LEARNERS, NOISES, RANDOM, kind
 from robots import after_change, best, errors, harmful, over_anew, share
 from sgimd_torch.figures.names import COLOURS, NAMES
 from sgimd_torch.spaces import Array
-from sgimd_torch.views.statistics import iqm_interval, rng
+from sgimd_torch.views.statistics import Interval, iqm_interval, rng
 
 FACTORS: Final = np.geomspace(1, 8, 43)  # of a performance profile
 KINDS_AT: Final = 250
-BEGINNINGS: Final = {
-    ANEW: ("nothing", "#7f7f7f"),
-    GOES_ON: ("the simulator", "#332288"),
-    WRONG: ("a mirrored simulator", "#cc6677"),
-}
+BEGINNINGS: Final = {ANEW: "nothing", GOES_ON: "the simulator", WRONG: "a mirrored simulator"}
 
 
 def shares(found: Evidence) -> Figure:
@@ -35,7 +32,8 @@ def shares(found: Evidence) -> Figure:
     figure, panels = _panels("learner is best", "worse than random movements")
     for ax, statistic, learners in zip(panels, (best, harmful), (LEARNERS, [*LEARNERS][:-1]), strict=True):
         for name in learners:
-            _band(ax, COUNTS, np.array([statistic(found, name, at) for at in COUNTS]), name, "o-")
+            by_count = [statistic(found, name, at) for at in COUNTS]
+            _drawn(ax, COUNTS, by_count, COLOURS[name], NAMES[name], "o-")
         ax.set(xscale="log", xlabel="movements executed", ylim=(0, 1))
         _ticks(ax, COUNTS)
     _legend(figure, panels[0])
@@ -49,7 +47,8 @@ def profile(found: Evidence) -> Figure:
         table = errors(found, at)
         ratios = table.div(table.min(axis=1), axis=0)
         for name in LEARNERS:
-            _band(ax, FACTORS, np.array([share(ratios[name] <= factor) for factor in FACTORS]), name)
+            within = [share(ratios[name] <= factor) for factor in FACTORS]
+            _drawn(ax, FACTORS, within, COLOURS[name], NAMES[name], "-")
         ax.set(xscale="log", xlabel="error / smallest error, at most", ylim=(0, 1), xlim=(1, FACTORS[-1]))
         _ticks(ax, (1, 2, 4, 8))
     _legend(figure, panels[0])
@@ -84,13 +83,11 @@ def changes(found: Evidence) -> Figure:
     panels = figure.subplots(2, 2, sharey=True)
     for ax, robot in zip(panels.flat, ROBOTS, strict=True):
         times = after(robot)
-        cells = np.array([[_ratio(found, robot, change, at) for at in times] for change in CHANGES])
+        cells = np.array([[over_anew(found, robot, each, at, level=None).value for at in times] for each in CHANGES])
         ax.pcolormesh(cells, cmap="RdBu_r", norm=LogNorm(0.1, 10), edgecolors="white", linewidth=2)
         for (row, column), ratio in np.ndenumerate(cells):
-            dark = not 0.25 < ratio < 4
-            ax.text(
-                column + 0.5, row + 0.5, f"{ratio:.2f}", ha="center", va="center", color="white" if dark else "black"
-            )
+            colour = "black" if 0.25 < ratio < 4 else "white"
+            ax.text(column + 0.5, row + 0.5, f"{ratio:.2f}", ha="center", va="center", color=colour)
         ax.set_xticks(np.arange(len(times)) + 0.5, map(str, times))
         ax.set_yticks(np.arange(len(CHANGES)) + 0.5, [change.replace("-0", " 0") for change in CHANGES])
         ax.set(title=robot, ylim=(len(CHANGES), 0))
@@ -104,11 +101,10 @@ def simulator(found: Evidence) -> Figure:
     """Error on the arm as it was built, of learners that begin with what a simulator showed or with nothing."""
     figure = Figure(figsize=(7.5, 4), layout="constrained")
     ax = figure.subplots()
-    for learner, (name, colour) in BEGINNINGS.items():
-        found_at = [
-            iqm_interval(after_change(found, ARM, SIMULATOR, learner, at).to_numpy(), rng=rng()) for at in BEGUN
-        ]
-        _drawn(ax, BEGUN, np.array(found_at), colour, f"begun with {name}", "o-")
+    for (learner, name), colour in zip(BEGINNINGS.items(), ("random", "practice", "sagg-riac"), strict=True):
+        by_seed = [after_change(found, ARM, SIMULATOR, learner, at).to_numpy() for at in BEGUN]
+        means = [iqm_interval(each, rng=rng()) for each in by_seed]
+        _drawn(ax, BEGUN, means, COLOURS[colour], f"begun with {name}", "o-")
     ax.set(xscale="log", yscale="log", xlabel="movements on the real arm", ylabel="mean distance to the goals (m)")
     _ticks(ax, BEGUN)
     ax.set_yticks((0.03, 0.05, 0.1, 0.2, 0.3), ("0.03", "0.05", "0.1", "0.2", "0.3"))
@@ -131,14 +127,11 @@ def _panels(*titles: str) -> tuple[Figure, Array]:
     return figure, panels
 
 
-def _band(ax: Axes, x: ArrayLike, intervals: Array, name: str, form: str = "-") -> None:
-    _drawn(ax, x, intervals, COLOURS[name], NAMES[name], form)
-
-
-def _drawn(ax: Axes, x: ArrayLike, intervals: Array, colour: str, name: str, form: str) -> None:
-    """A curve with its interval ``(n, 3)`` as a band."""
-    ax.fill_between(x, intervals[:, 1], intervals[:, 2], color=colour, alpha=0.12, linewidth=0)
-    ax.plot(x, intervals[:, 0], form, color=colour, markersize=5, label=name, zorder=3 - 0.1 * len(ax.lines))
+def _drawn(ax: Axes, x: ArrayLike, intervals: Sequence[Interval], colour: str, name: str, form: str) -> None:
+    """Draw a curve, with its intervals as a band; earlier curves lie above later ones."""
+    middle, low, high = np.array(intervals).T
+    ax.fill_between(x, low, high, color=colour, alpha=0.12, linewidth=0)
+    ax.plot(x, middle, form, color=colour, markersize=5, label=name, zorder=3 - 0.1 * len(ax.lines))
 
 
 def _ticks(ax: Axes, places: tuple[float, ...]) -> None:
@@ -148,7 +141,3 @@ def _ticks(ax: Axes, places: tuple[float, ...]) -> None:
 
 def _legend(figure: Figure, ax: Axes) -> None:
     figure.legend(*ax.get_legend_handles_labels(), loc="outside upper center", ncols=3, frameon=False)
-
-
-def _ratio(found: Evidence, robot: str, change: str, at: int) -> float:
-    return over_anew(found, robot, change, at, level=None).value
