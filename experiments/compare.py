@@ -1,8 +1,8 @@
 """Run the experiments, every variant with several seeds, and collect the results in tables.
 
 variants.py lists the variants. A run is in OUT/VARIANT/seed-003. After the run, results.csv in RESULTS gets a row for
-each of its evaluations by each inverse model that a page shows. asked.csv gets the requests of learners that ask, and
-explored.csv the tiles reached and the goals chosen. A variant of two experiments is run once; both get rows.
+each of its evaluations by each inverse model. asked.csv gets the requests of learners that ask, and
+explored.csv the tiles reached and the goals chosen.
 
 After Ctrl-C or a power cut, or for more seeds, start the command again: runs in the tables are not repeated, and
 stopped runs continue. If a run fails, the others continue.
@@ -32,27 +32,24 @@ with loading():  # Ctrl-C shows no traceback
     from sgimd_torch.runs.read import finished, read_run
     from sgimd_torch.runs.sweep import add_options
     from table import FILE, ROWS, Row, answers_of, merge, own_answer, read_table, result_rows
-    from variants import ALIKE, ANSWERS, EXPERIMENTS, MADE, SEEDS, SMALL_TABLES, Variant, make_subsets, seeds_of
+    from variants import EXPERIMENTS, MADE, SEEDS, SMALL_TABLES, Variant, make_subsets
 
 EXAMPLES: Final = f"""experiments: {", ".join(EXPERIMENTS)}
 
 examples:
   python experiments/compare.py --dry-run                         list the runs that the pages still lack
   python experiments/compare.py                                   make the runs that the pages still lack
-  python experiments/compare.py learners large-space --seeds 0-2 --results mine
-  python experiments/compare.py ablations --only uniform-goals grid --results mine   two variants, rows in mine/
+  python experiments/compare.py --results mine                    all rows again, into mine/
+  python experiments/compare.py paper large --seeds 0-2 --results mine
+  python experiments/compare.py rivals --only sgim-d-once cma-me --results mine      two variants, rows in mine/
   python experiments/compare.py --shard 3/20                      a part of the runs, see docs/clusters.md
   python experiments/compare.py --verify 10 --lot 7               make ten random rows again, and compare
 
 Exit code: 0 all runs are in the tables, 1 some failed, 2 the request is wrong, 130 or 143 stopped by a signal.
 """
-# Experiments whose runs measure the noise floor. Measuring takes as long as the rest of a run.
-FLOORS: Final = ("learners", "letter", "forward-model")
-FLOOR_AT: Final = 5000
-RUN: Final = ["experiment", "variant", "seed", "movements", "answer"]
+RUN: Final = ["variant", "seed", "movements", "answer"]
 NUMBERS: Final = ["error", "floor"]
 ROUNDING: Final = 1e-5  # relative difference that rounding on another processor may cause over thousands of movements
-Wanted = tuple[str, Config]  # name of an experiment, and settings of a run whose rows the experiment gets
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -63,37 +60,27 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     options = _options(argv)
     whole = runs_of(options.experiments, options.only, options.seeds, options.out)
-    runs = list(dict.fromkeys(config for _, config in whole))
-    mine = {*options.shard.of(runs)}
-    wanted = [(name, config) for name, config in whole if config in mine]
+    wanted = list(options.shard.of(whole))
     table = read_table(options.results)
     if options.verify:
         return verify(wanted, table, options)
     known = {*table[RUN].itertuples(index=False, name=None)}
-    left = [(name, config) for name, config in wanted if not last_rows(name, config) <= known]
+    left = [config for config in wanted if not last_rows(config) <= known]
     where = options.results / FILE
-    say(f"{len(wanted)} runs{options.shard.note(runs)}, {len(wanted) - len(left)} of them in {where} already")
+    say(f"{len(wanted)} runs{options.shard.note(whole)}, {len(wanted) - len(left)} of them in {where} already")
     if wanted and not left:
         say("nothing is left to run: --verify 10 makes ten of these rows again, --results FOLDER makes all again")
     if options.dry_run:
-        print("".join(f"{name}: {config.title}\n" for name, config in left), end="")
+        print("".join(f"{config.title}\n" for config in left), end="")
     if options.dry_run or not left:
         return 0
     make_folder(options.results)
-    homes: dict[Config, list[str]] = {}  # experiments of each run
-    for name, config in left:
-        homes.setdefault(config, []).append(name)
-
-    def on_end(config: Config) -> None:
-        for name in homes[config]:
-            collect(name, config, options.results)
-
-    failures = _run([*homes], options, on_end)
-    say(f"{len(homes) - len(failures)} runs ended well, {len(failures)} failed: {where}", *failures)
+    failures = _run(left, options, lambda config: collect(config, options.results))
+    say(f"{len(left) - len(failures)} runs ended well, {len(failures)} failed: {where}", *failures)
     return 1 if failures else 0
 
 
-def verify(wanted: Sequence[Wanted], table: pd.DataFrame, options: argparse.Namespace) -> int:
+def verify(wanted: Sequence[Config], table: pd.DataFrame, options: argparse.Namespace) -> int:
     """Draw rows of the table at random, make each row again by a new run, and compare old and new row.
 
     The new run ends at the number of movements in the row and is evaluated only there; evaluations do not change
@@ -102,13 +89,13 @@ def verify(wanted: Sequence[Wanted], table: pd.DataFrame, options: argparse.Name
     Returns:
         0 if all rows are equal except for rounding, else 1.
     """
-    configs = {(name, config.variant, config.seed): config for name, config in wanted}
-    rows = [row for row in table.to_dict("records") if (row["experiment"], row["variant"], row["seed"]) in configs]
+    configs = {(config.variant, config.seed): config for config in wanted}
+    rows = [row for row in table.to_dict("records") if (row["variant"], row["seed"]) in configs]
     drawn = [rows[k] for k in sorted(np.random.default_rng(options.lot).permutation(len(rows))[: options.verify])]
     folder, again = options.out / f"verify-{options.lot}", list[Config]()
     for row in drawn:
-        config, movements = configs[row["experiment"], row["variant"], row["seed"]], row["movements"]
-        out = folder / f"{row['experiment']}-{movements}"
+        config, movements = configs[row["variant"], row["seed"]], row["movements"]
+        out = folder / str(movements)
         again.append(replace(config, movements=movements, evaluate_at=(movements,), out=out))
     say(f"{len(again)} rows of {len(rows)}, made again in {folder}")
     if options.dry_run:
@@ -117,7 +104,7 @@ def verify(wanted: Sequence[Wanted], table: pd.DataFrame, options: argparse.Name
     failures = _run([*dict.fromkeys(again)], options)
     verdicts = []
     for row, config in zip(drawn, again, strict=True):
-        made = result_rows(row["experiment"], config, read_run(config.directory)) if finished(config) else []
+        made = result_rows(config, read_run(config.directory)) if finished(config) else []
         now = next((each for each in made if each["answer"] == row["answer"]), {})
         verdicts.append(compared(row, now))
         print(f"{verdicts[-1]:8} {_in_words(row)}" + ("" if verdicts[-1] == "equal" else f"  now {_in_words(now)}"))
@@ -136,8 +123,8 @@ def compared(shipped: Row, now: Row) -> str:
     return "rounding" if np.allclose(found, then, rtol=ROUNDING, atol=0, equal_nan=True) else "DIFFERS"
 
 
-def runs_of(experiments: Sequence[str], only: Sequence[str], seeds: Sequence[int] | None, out: Path) -> list[Wanted]:
-    """Pairs of experiment and run, seed by seed, so that every variant gets its first seeds early.
+def runs_of(experiments: Sequence[str], only: Sequence[str], seeds: Sequence[int] | None, out: Path) -> list[Config]:
+    """Settings of runs, seed by seed, so that every variant gets its first seeds early.
 
     Args:
         experiments: names of experiments, as in ``EXPERIMENTS``.
@@ -148,44 +135,45 @@ def runs_of(experiments: Sequence[str], only: Sequence[str], seeds: Sequence[int
     found = []
     for seed in sorted({*chain(*SEEDS.values())}) if seeds is None else seeds:
         for experiment in experiments:
-            floors = (FLOOR_AT,) if experiment in FLOORS else ()
+            if seeds is None and seed not in SEEDS[experiment]:
+                continue
             for variant, line in EXPERIMENTS[experiment].items():
-                if (only and variant not in only) or (seeds is None and seed not in seeds_of(experiment, variant)):
+                if only and variant not in only:
                     continue
-                run: Variant = {"seed": seed, "out": out, "name": variant, "floor_at": floors, **line}
+                run: Variant = {"seed": seed, "out": out, "name": variant, "floor_at": (), **line}
                 if run.get("demonstrations") in MADE:
                     run["demonstrations"] = out / "demonstrations" / run["demonstrations"]
                 config = Config.from_settings(run)
-                found.append((experiment, replace(config, evaluated_by=answers_of(experiment, config))))
+                found.append(replace(config, evaluated_by=answers_of(config)))
     return found
 
 
-def last_rows(experiment: str, config: Config) -> set[tuple[Any, ...]]:
+def last_rows(config: Config) -> set[tuple[Any, ...]]:
     """Keys of the rows of a run's last evaluation; a table that has these rows has all rows of the run."""
-    answers = {own_answer(config) if answer == OWN else answer for answer in config.evaluated_by}
-    answers.intersection_update(ANSWERS.get(experiment, ALIKE))
-    return {(experiment, config.variant, config.seed, config.movements, answer) for answer in answers}
+    answers = (own_answer(config) if answer == OWN else answer for answer in config.evaluated_by)
+    return {(config.variant, config.seed, config.movements, answer) for answer in answers}
 
 
-def collect(experiment: str, config: Config, results: Path) -> None:
-    """Merge the rows of a finished run, read from its directory, into the tables of its experiment.
+def collect(config: Config, results: Path) -> None:
+    """Merge the rows of a finished run, read from its directory, into the tables.
 
     Raises:
         RunError: the run is damaged, or was not evaluated at its end.
         ResultsError, OSError: a table cannot be read or written.
     """
     run = read_run(config.directory)
-    rows = result_rows(experiment, config, run)
+    rows = result_rows(config, run)
     if config.movements not in {row["movements"] for row in rows}:
         raise RunError(f"{run.path} has no evaluation after {config.movements} movements, though it ended")
-    if name := SMALL_TABLES.get(experiment):
-        merge(results, name, ROWS[name](config, run))
+    for experiment, variants in EXPERIMENTS.items():
+        if config.variant in variants and (name := SMALL_TABLES.get(experiment)):
+            merge(results, name, ROWS[name](config, run))
     merge(results, FILE, rows)  # last, because with these rows the run counts as done
 
 
 def _run(configs: Sequence[Config], options: argparse.Namespace, on_end: Any = None) -> list[str]:
     """Carry out runs; returns error messages, one for each failed run."""
-    make_subsets(options.out / "demonstrations", by_hand="by-hand" in options.experiments)
+    make_subsets(options.out / "demonstrations")
     return sweep(configs, options.processes, on_end=on_end)
 
 

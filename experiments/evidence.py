@@ -59,7 +59,7 @@ class Evidence:
             ResultsError: a table is damaged.
         """
         key = ["answer", "variant", "movements", "seed"]
-        rows = read_table(folder).drop_duplicates(key).set_index(key)[["error", "floor"]].sort_index()
+        rows = read_table(folder).set_index(key)[["error", "floor"]].sort_index()
         explored, asked = (read_table(folder, name).set_index("variant") for name in ("explored.csv", "asked.csv"))
         return cls(rows, explored, asked)
 

@@ -29,12 +29,11 @@ with loading():  # Ctrl-C shows no traceback
 
     from claimed import WHOLE
     from evidence import LAST, Evidence, NotRun
-    from page_tables import GAIN, SETTINGS, TAUGHT
+    from page_tables import GAIN
     from sgimd_torch.figures.learning import COLOURS, NAMES
     from sgimd_torch.figures.save import save_figure
     from sgimd_torch.files import make_folder
     from sgimd_torch.views.statistics import Interval, iqm_interval, rng
-    from variants import EXPERIMENTS
 
 KIND: Final = "svg"
 ERROR: Final = "mean distance to the goals (m)"
@@ -45,8 +44,7 @@ def learning(found: Evidence) -> Figure:
     """Error against movements on the rod."""
     figure = Figure(figsize=(8, 4.4), layout="constrained")
     ax = figure.subplots()
-    shown = {"random": "random-nearest.rod", **{name: f"{name}.rod" for name in ("sagg-riac", "sgim-d", "practice")}}
-    curves(ax, found, {**shown, "practice-taught": "practice-taught.rod"})
+    curves(ax, found, {name: name for name in ("random", "sagg-riac", "sgim-d", "practice", "practice-taught")})
     return figure
 
 
@@ -62,9 +60,8 @@ def paper(found: Evidence) -> Figure:
 
 
 def gain(found: Evidence) -> Figure:
-    """The error after 1000 movements on the rod, at each step of GAIN and TAUGHT."""
-    steps = {**GAIN, **TAUGHT}
-    return _rows({step: partial(found.error, f"{name}.rod", 1000) for step, name in steps.items()}, ERROR)
+    """The error after 1000 movements on the rod, at each step of GAIN."""
+    return _rows({step: partial(found.error, name, 1000) for step, name in GAIN.items()}, ERROR)
 
 
 def curiosity(found: Evidence) -> Figure:
@@ -72,14 +69,8 @@ def curiosity(found: Evidence) -> Figure:
     pairs = {
         "SGIM-D, T 10⁴ times larger, 5000": ("sgim-d-large", "sgim-d-uniform-large", LAST),
         "... by the paper's eq. (3), 5000": ("sgim-d-absolute-large", "sgim-d-uniform-large", LAST),
-        "SGIM-D, 5000": ("sgim-d.rod", "sgim-d-uniform.rod", LAST),
-        "practice, 5000": ("practice-interest.rod", "practice-uniform.rod", LAST),
-        **{
-            f"{NAMES[name]}, {setting}, 2000": (f"{name}@{setting}", f"{name}-uniform@{setting}", 2000)
-            for name in ("sgim-d", "sagg-riac")
-            for setting in SETTINGS
-            if f"{name}@{setting}" in EXPERIMENTS["settings"]
-        },
+        "SGIM-D, 5000": ("sgim-d", "sgim-d-uniform", LAST),
+        "practice, 5000": ("practice-interest", "practice-uniform", LAST),
     }
     numbers = {label: partial(found.ratio, *pair) for label, pair in pairs.items()}
     figure = _rows(numbers, "error with interest / with uniform goals", form=".2f")

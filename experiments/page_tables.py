@@ -7,67 +7,42 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import chain
 from pathlib import Path
 from typing import Final
 
-from claimed import paper
+from claimed import SUITE, on, paper
 from evidence import LAST, Evidence, NotRun, Statistic
 from judging import MISSING, Claim, Verdict, judge
 from sgimd_torch.views.statistics import show
-from sgimd_torch.views.suite import RANDOM, UNIFORM, titled
+from sgimd_torch.views.suite import TASKS, UNIFORM, titled
 from table import read_table
-from variants import ARMS, EXPERIMENTS, REFINING, ROBOTS, SPARSE, SUITE, TEACHERS
+from variants import ARMS, EXPERIMENTS, VARIANTS
 
-SETTINGS: Final = (*ROBOTS, *TEACHERS)
-VARIANTS: Final = {name for variants in EXPERIMENTS.values() for name in variants}
 MISSING_CELL: Final = "–"
 # Three variants of each rival: without a teacher, with a demonstration every 30 movements, with all at the start.
 RIVALS: Final[Mapping[str, tuple[str, str, str]]] = {
-    "practice": ("practice.rod", "practice-taught-every-30.rod", "practice-taught.rod"),
-    "SAGG-RIAC; SGIM-D": ("sagg-riac.rod", "sgim-d.rod", "sgim-d-once.rod"),
-    "the standard baseline": (f"{UNIFORM}.rod", "uniform-nearest-taught.rod", "uniform-nearest-taught-once.rod"),
-    "CMA-MAE": ("cma-mae.rod", "cma-mae-taught.rod", "cma-mae-taught-once.rod"),
-    "MAP-Elites": ("map-elites.rod", "map-elites-taught.rod", "map-elites-taught-once.rod"),
-    "Random; Imitation": (f"{RANDOM}.rod", "imitation.rod", ""),
-    "isoline*": ("isoline", "isoline-demonstrations", ""),
-    "CMA-ME*": ("cma-me", "cma-me-demonstrations", ""),
-    "demonstrations and noise*": ("", "demonstrations-noise", ""),
-    "CMA-ME, CMA-MAE, tuned*": ("cma-me-tuned", "cma-mae-demonstrations-tuned", ""),
-    "MAP-Elites, tuned*": ("map-elites-tuned", "", ""),
-    "Random, from the middle": ("middle-random.rod", "", ""),
-    "MAP-Elites, from the middle": ("middle-map-elites.rod", "", ""),
-    "Goal babbling from home": ("home-babbling.rod", "", ""),
+    "practice": ("practice", "practice-taught-every-30", "practice-taught"),
+    "SAGG-RIAC; SGIM-D": ("sagg-riac", "sgim-d", "sgim-d-once"),
+    "the standard baseline": (UNIFORM, "uniform-nearest-taught", "uniform-nearest-taught-once"),
+    "CMA-MAE": ("cma-mae", "cma-mae-taught", "cma-mae-taught-once"),
+    "MAP-Elites": ("map-elites", "map-elites-taught", "map-elites-taught-once"),
+    "CMA-ME": ("cma-me", "cma-me-taught", ""),
+    "Random; Imitation": ("random", "imitation", ""),
+    "CMA-ME, CMA-MAE, tuned": ("cma-me-tuned", "cma-mae-taught-tuned", ""),
+    "MAP-Elites, tuned": ("map-elites-tuned", "", ""),
+    "Random, from the middle": ("random-middle", "", ""),
+    "MAP-Elites, from the middle": ("map-elites-middle", "", ""),
+    "Goal babbling from home": ("home-babbling", "", ""),
 }
 # Steps from random movements to the algorithm practice, each added to the step before.
 GAIN: Final[Mapping[str, str]] = {
-    "random movements": RANDOM,
+    "random movements": "random",
     "the standard baseline": UNIFORM,
     "... begun in the middle": "middle",
     "... with `process`": "middle-process",
-    "... with its noise": "practice-uniform",
+    "practice with uniform goals": "practice-uniform",
     "... and goals by interest": "practice-interest",
     "... or within reach: `practice`": "practice",
-}
-TAUGHT: Final[Mapping[str, str]] = {
-    "the standard baseline, every 30": "uniform-nearest-taught",
-    "SGIM-D, every 30": "sgim-d",
-    "`practice`, every 30": "practice-taught-every-30",
-    "the standard baseline, at the start": "uniform-nearest-taught-once",
-    "SGIM-D, at the start": "sgim-d-once",
-    "`practice`, at the start": "practice-taught",
-}
-# For each idea, pairs of learners with and without it: first the pair without a teacher, then the pair with a teacher.
-IDEAS: Final = {
-    "interest in the place of uniform goals": (("sagg-riac", "sagg-riac-uniform"), ("sgim-d", "sgim-d-uniform")),
-    "practice in the place of goal babbling": (("practice", "sagg-riac"), ("practice-taught", "sgim-d")),
-    "being shown": (("sgim-d", "sagg-riac"), ("practice-taught", "practice")),
-    "a forward model": (("sagg-riac-model", "sagg-riac"), ("sgim-d-model", "sgim-d")),
-    "goals in the place of movements": (("sagg-riac", "random"),),
-    "interest and simplex in the place of the standard baseline": (
-        ("sagg-riac", "uniform"),
-        ("sgim-d", "uniform-taught"),
-    ),
 }
 
 
@@ -107,6 +82,14 @@ class Page:
     def less(self, ours: str, theirs: str, at: int = LAST, form: str = ".3f") -> str:
         """Their error minus ours (m), with the interval of this difference."""
         return self.cell(self.found.difference, theirs, ours, at, form=form, between=True)
+
+    def seeds(self, name: str) -> str:
+        """The seeds whose runs have ended: ``240 to 259``."""
+        try:
+            found = self.found.at(name, max(VARIANTS[name]["evaluate_at"])).index
+        except NotRun:
+            return MISSING_CELL
+        return f"{found.min()} to {found.max()}"
 
     def ratio(self, ours: str, theirs: str, at: int = LAST) -> str:
         """Our error divided by theirs, with the interval of this ratio."""
@@ -160,103 +143,60 @@ class Page:
         head = ("learner", "no teacher", "one every 30, ten imitations each", "all at the start, once each")
         return markdown(head, rows)
 
-    def answers(self) -> str:
-        """Errors after 5000 movements if each of three inverse models answers."""
-        names = ("practice-taught", "practice-uniform", "sgim-d", "uniform-nearest-taught", "cma-mae", "cma-mae-taught")
-        by = ("nearest", "linear", "process")
-        rows = [[f"`{name}`", *(self.error(f"{name}.rod by {answer}") for answer in by)] for name in names]
-        return markdown(("memory of", "nearest", "`LocallyLinear`", "`process`"), rows)
-
     def suite(self, at: int = 1000) -> str:
         """Errors divided by the error of random movements: on each task, and as interquartile mean over tasks."""
-        learners, every = ("practice", UNIFORM, "map-elites"), (*SUITE, *SPARSE)
-        known = {name: [task for task in every if f"{name}.{task}" in VARIANTS] for name in learners}
+        learners = ("practice", UNIFORM, "map-elites")
+        known = {name: [task for task in TASKS if on(name, task) in VARIANTS] for name in learners}
         rows = [
             [titled(task), *(self._over_tasks(name, [task], at) if task in known[name] else "–" for name in learners)]
-            for task in every
+            for task in TASKS
         ]
         rows.append(["mean over tasks", *(self._over_tasks(name, known[name], at) for name in learners)])
         return markdown(("task", *learners), rows)
 
     def gain(self) -> str:
-        """Errors at each step from random movements to practice, and of three learners with each teaching schedule."""
+        """Errors at each step from random movements to practice."""
         rows = []
-        for step, name in {**GAIN, **TAUGHT}.items():
-            on_suite = all(f"{name}.{task}" in VARIANTS for task in SUITE)
-            early = self.error(f"{name}.rod", 1000, between=True)
-            mean = self._over_tasks(name, [*SUITE], 1000) if on_suite else ""
-            rows.append([step, early, self.error(f"{name}.rod"), mean])
+        for step, name in GAIN.items():
+            on_suite = all(on(name, task) in VARIANTS for task in SUITE)
+            mean = self._over_tasks(name, SUITE, 1000) if on_suite else ""
+            rows.append([step, self.error(name, 1000, between=True), self.error(name), mean])
         return markdown(("step", "rod, 1000 (m)", "rod, 5000 (m)", "suite, 1000"), rows)
-
-    def changes(self) -> str:
-        """The error that each change adds to the error of SGIM-D."""
-        rows = [
-            [f"`{name}`", self.cell(self.found.difference, name, "sgim-d", form="+.4f", between=True)]
-            for experiment in ("ablations", "teaching")
-            for name in EXPERIMENTS[experiment]
-        ]
-        return markdown(("change", "difference to SGIM-D at 5000 (m)"), rows)
 
     def steps(self) -> str:
         """Errors at each step from the letter of the paper to our defaults, in the small and in the large T."""
         rows = []
-        both = [[f"sgim-d-letter{end}", *EXPERIMENTS[f"ladder{end}"], f"sgim-d{end}"] for end in ("", "-large")]
+        small = [name for name in EXPERIMENTS["ladder"] if not name.endswith("-large")]
+        both = [[f"{name}{end}" for name in ("sgim-d-letter", *small, "sgim-d")] for end in ("", "-large")]
         for name, large in zip(*both, strict=True):
             own = " by paper" if name.endswith("letter") else " by linear" if name.startswith("ladder") else ""
             rows.append([f"`{name}`", *(self.error(each) for each in (f"{name}{own}", name, large))])
         return markdown(("step", "T, by its own answer", "T, by `process`", "large T, by `process`"), rows)
 
     def models(self) -> str:
-        """Errors (m) of learners with and without a forward model; in the last column `process` answers for all."""
-        ends = {"": (1000, LAST), **{f"-{arm.removeprefix('planar-')}": (2000,) for arm in ARMS}}
+        """Errors (m) of SGIM-D with and without a forward model; in the last column `process` answers for all."""
         rows = []
-        for name, line in REFINING.items():
-            by = " by model-alone" if line.get("inverse") == "model-alone" else ""
-            found = [self.errors(f"{name}{ending}{by}", times, ".4f") for ending, times in ends.items()]
-            rows.append([f"`{name}`", *chain(*found), self.error(name, LAST, ".4f")])
+        for name, by in (("sgim-d", ""), ("sgim-d-model", " by model"), ("sgim-d-model-alone", " by model-alone")):
+            arms = [f"{name}.{arm}{by}" for arm in ARMS]
+            cells = [self.error(each, 2000, ".4f") if f"{name}.{ARMS[0]}" in VARIANTS else "–" for each in arms]
+            rows.append(
+                [f"`{name}`", *self.errors(f"{name}{by}", (1000, LAST), ".4f"), *cells, self.error(name, form=".4f")]
+            )
         head = ("learner", "rod, 1000", "rod, 5000", "arm of 7, 2000", "arm of 50, 2000", "rod, 5000, by `process`")
         return markdown(head, rows)
 
     def asking(self) -> str:
         """Errors on the rod, and numbers of demonstrations, of learners that ask and of others; the best come first."""
         names = [name for name in EXPERIMENTS["asking"] if "toss" not in name]
-        names.remove("sgim-acts-3")  # another name of the variant sgim-im
         rows = []
-        for name in sorted(names, key=lambda name: self.error(name, LAST, ".9f")):
-            shown = "0" if name == "alone" else "all"
-            if name.startswith("sgim"):
+        for name in sorted(
+            ["practice", "practice-taught", "sgim-d", *names], key=lambda name: self.error(name, LAST, ".9f")
+        ):
+            shown = "0" if name == "practice" else "all"
+            if name.startswith(("sgim-im", "sgim-acts", "sgim-eer")):
                 shown = self.cell(self.found.count, "asked", name, "shown", form=".0f")
             rows.append([f"`{name}`", *self.errors(name, (1000, LAST)), shown])
         return markdown(("learner", "1000", "5000", "shown"), rows)
-
-    def settings(self, at: int = 2000) -> str:
-        """The error with an idea divided by the error without it, in each setting; bold if the interval excludes 1.
-
-        A learner without a variant for a setting does not depend on this setting; "as-it-is" is then its variant.
-        """
-
-        def cell(setting: str, *pair: str) -> str:
-            here = [f"{name}@{setting}" in VARIANTS for name in pair]
-            names = [f"{name}@{setting if own else 'as-it-is'}" for name, own in zip(pair, here, strict=True)]
-            answered = [name + " by model" * ("-model@" in name) for name in names]
-            if not any(here):
-                return MISSING_CELL
-            return self.cell(self.found.ratio, *answered, at, form=".2f", between=True, bold=True)
-
-        rows = [
-            [f"{idea}: `{pair[0]}`", *(cell(setting, *pair) for setting in SETTINGS)]
-            for idea, pairs in IDEAS.items()
-            for pair in pairs
-        ]
-        return markdown(("idea", *SETTINGS), rows)
-
-    def study(self, experiment: str, head: str, times: Sequence[int]) -> str:
-        """Errors of each learner of an experiment, with intervals."""
-        rows = [
-            [f"`{name.removesuffix('-swimmer')}`", *self.errors(name, times, between=True)]
-            for name in EXPERIMENTS[experiment]
-        ]
-        return markdown((head, *map(str, times)), rows)
 
     def tuned(self) -> str:
         """Errors (m) of each rival with its default setting and with the best setting of the first round.
@@ -278,5 +218,5 @@ class Page:
         return markdown(("rival", "setting", "first seeds", "later seeds"), rows)
 
     def _over_tasks(self, name: str, tasks: Sequence[str], at: int) -> str:
-        names = [[f"{each}.{task}" for task in tasks] for each in (name, RANDOM)]
+        names = [[on(each, task) for task in tasks] for each in (name, "random")]
         return self.cell(self.found.over_tasks, *names, at, form=".2f")

@@ -1,7 +1,7 @@
 """The table of results: one row for each evaluation of a run by one inverse model, read and written with pandas.
 
-    table = read_table(Path("results")); table[table.experiment == "learners"]
-    merge(Path("results"), "results.csv", result_rows("learners", config, run))
+    table = read_table(Path("results")); table[table.variant == "sgim-d"]
+    merge(Path("results"), "results.csv", result_rows(config, run))
 A row that is made again from the same run is equal, byte for byte. explored.csv and asked.csv have further numbers.
 """
 
@@ -24,20 +24,20 @@ from sgimd_torch.runs.read import Run
 from sgimd_torch.runs.tasks import benchmark_of
 from sgimd_torch.runs.tasks.taught import demonstrations_of
 from sgimd_torch.spaces import Array
-from variants import ALIKE, ANSWERS
 
 Row = dict[str, Any]
 FILE: Final = "results.csv"
+ALIKE: Final = "process"  # inverse model that answers for every learner
 _ASKED: Final = ("requests", "shown", "late", "late_own", "strong", "weak")
 # Of each table: the number of columns that form its key, and all columns, the key first. Keys of rows are unique.
 TABLES: Final[dict[str, tuple[int, tuple[str, ...]]]] = {
-    FILE: (6, ("experiment", "variant", "task", "seed", "movements", "answer", "error", "floor")),
+    FILE: (4, ("variant", "seed", "movements", "answer", "task", "error", "floor")),
     "explored.csv": (2, ("variant", "seed", "tiles", "goals", "near")),
     "asked.csv": (3, ("variant", "seed", "teacher", *_ASKED)),
     "rivals.csv": (4, ("rival", "setting", "seed", "movements", "linear", "process")),
 }
 TYPES: Final = {  # types of columns; all other columns have floats, and an empty field is NaN
-    **dict.fromkeys(("experiment", "variant", "task", "answer", "teacher", "rival", "setting"), "str"),
+    **dict.fromkeys(("variant", "task", "answer", "teacher", "rival", "setting"), "str"),
     **dict.fromkeys(("seed", "movements", "tiles", *_ASKED), "int64"),
     **dict.fromkeys(("goals", "near"), "Int64"),  # with empty fields
 }
@@ -101,19 +101,18 @@ def write_table(folder: Path, name: str, table: pd.DataFrame) -> None:
     write_text(folder / name, table.to_csv(index=False, lineterminator="\n"))
 
 
-def result_rows(experiment: str, config: Config, run: Run) -> list[Row]:
-    """Rows of results.csv: one for each evaluation of a finished run by each inverse model that pages show.
+def result_rows(config: Config, run: Run) -> list[Row]:
+    """Rows of results.csv: one for each evaluation of a finished run by each of its `answers_of`.
 
     For the learner's own inverse model, the column ``answer`` has its name in the catalogue.
     """
     rows: list[Row] = []
-    key = {"experiment": experiment, "variant": config.variant, "task": task_name(config), "seed": config.seed}
+    key = {"variant": config.variant, "seed": config.seed, "task": task_name(config)}
     for answer, found in run.answers.items():
         name = own_answer(config) if answer == OWN else answer
-        if name in ANSWERS.get(experiment, ALIKE):
-            evaluations = (found[column].tolist() for column in ("movements", "mean_error", "noise_floor"))
-            for movements, error, floor in zip(*evaluations, strict=True):
-                rows.append({**key, "movements": movements, "answer": name, "error": error, "floor": floor})
+        evaluations = (found[column].tolist() for column in ("movements", "mean_error", "noise_floor"))
+        for movements, error, floor in zip(*evaluations, strict=True):
+            rows.append({**key, "movements": movements, "answer": name, "error": error, "floor": floor})
     return rows
 
 
@@ -122,13 +121,9 @@ def own_answer(config: Config) -> str:
     return str(config.values.get("inverse", "process")).replace("among-effects", "process")
 
 
-def answers_of(experiment: str, config: Config) -> tuple[str, ...]:
-    """Names of the inverse models in the evaluations of a run: first the run's own, then others that pages show.
-
-    A forward model and eq. (9) answer only for learners that also learn with them.
-    """
-    others = {"process", "linear", "nearest"}.intersection(ANSWERS.get(experiment, ALIKE)) - {own_answer(config)}
-    return (OWN, *sorted(others))
+def answers_of(config: Config) -> tuple[str, ...]:
+    """Names of the inverse models in the evaluations of a run: its own, and `process`, which answers for all."""
+    return (OWN,) if own_answer(config) == ALIKE else (OWN, ALIKE)
 
 
 def task_name(config: Config) -> str:

@@ -1,14 +1,13 @@
 """Every experiment as data: each variant has the options in which it differs from the defaults of ``sgimd run``.
 
 Section 6 of Nguyen & Oudeyer (2014) comes first, then further experiments.
-    EXPERIMENTS["ablations"]["uniform-goals"]        # {"algorithm": "sgim-d", "goals": "uniform"}
-A variant of two experiments has equal options in both. It is run once, and both experiments get its rows.
+    EXPERIMENTS["rivals"]["sgim-d-uniform"]        # {"algorithm": "sgim-d", "goals": "uniform", ...}
+A variant on the rod has a plain name, on another task the name of the task at its end: practice.toss.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -16,24 +15,18 @@ import numpy as np
 
 from sgimd_torch.demonstrations import SHIPPED, load_demonstrations, save_demonstrations
 from sgimd_torch.files import make_folder
-from sgimd_torch.spaces import stream
 from sgimd_torch.views.suite import REFERENCES, TASKS, UNIFORM
 
 Variant = dict[str, Any]
 ARMS: Final = ("planar-arm-7", "planar-arm-50")
-SWIMMERS: Final = ("random", "sagg-riac", "sgim-d")
 SGIM_D: Final[Variant] = {"algorithm": "sgim-d"}
 SAGG_RIAC: Final[Variant] = {"algorithm": "sagg-riac"}
-# The algorithm practice with uniform goals and without a search for effects. Taught on the rod, a learner with these
-# options makes the same movements as the default `practice-taught`.
-UNIFORM_PRACTICE: Final[Variant] = {
-    "algorithm": "practice",
-    "goals": "uniform",
-    "explore": "widening",
-    "inverse": "process",
-}
 SPARSE: Final = ("puck", "fetch")  # tasks where most movements do nothing
-SUITE: Final = {task: suited for task, suited in TASKS.items() if task not in SPARSE}
+ROD: Final = "rod"
+WHOLE: Final[Variant] = {"evaluate_at": (250, 500, 1000, 2000, 5000)}
+END: Final[Variant] = {"evaluate_at": (5000,)}
+SHORT: Final[Variant] = {"movements": 2000, "evaluate_at": (250, 500, 1000, 2000)}
+FLOOR: Final[Variant] = {"floor_at": (5000,)}  # measures the noise floor, too
 EXACT: Final[Variant] = {"search.noise": 0.0}  # the simplex without noise
 COMPLETE: Final[Variant] = {
     "search.complete": True,
@@ -56,143 +49,32 @@ STEPS: Final[tuple[tuple[str, Variant, Variant], ...]] = (
 )
 LETTER: Final[Variant] = {option: value for _, was, _ in reversed(STEPS) for option, value in was.items()}
 INVERSE: Final[Variant] = {"inverse": "paper"}  # the letter of the paper for learners without goals
-# Inverse models whose errors a page shows: `process` for every learner, and further ones for some learners. These are
-# eq. (9) for the letter of the paper, `linear` for a step of the ladder, and a forward model where one is trained.
-ALIKE: Final = ("process",)
-ANSWERS: Final[dict[str, tuple[str, ...]]] = {
-    **dict.fromkeys(("letter", "large-space"), (*ALIKE, "paper")),
-    "letter-teachers": ("paper",),
-    "ladder": (*ALIKE, "linear"),
-    **dict.fromkeys(("forward-model", "planar-arm-7", "planar-arm-50"), (*ALIKE, "model-alone")),
-    **dict.fromkeys(("settings", "proved-model"), (*ALIKE, "model")),
-    "learning": (*ALIKE, "linear", "nearest", "model"),
-    "suite": (*ALIKE, "linear", "nearest"),
-}
-# The second table, beside results.csv, that gets rows from the runs of an experiment.
-SMALL_TABLES: Final = {"asking": "asked.csv", **dict.fromkeys(("learners", "letter", "large-space"), "explored.csv")}
 LARGE: Final[Variant] = {"environment.task_space": 100.0}
 BASELINE: Final[Variant] = {"goals": "uniform", "inverse": "nearest", "search": "perturb"}  # standard baseline
-SCHOOL: Final = ("map-elites", "isoline", "cma-me", "cma-mae")  # algorithms of quality diversity
-SHORT: Final[Variant] = {"movements": 2000, "evaluate_at": (250, 500, 1000)}  # a run is also evaluated at its end
-# Files of demonstrations that ``make_subsets`` writes.
-FEW, MANY, HALF, CORNER, SHUFFLED, TEN, HAND = MADE = tuple(
-    Path(f"{name}.npz") for name in ("few", "many", "half", "corner", "shuffled", "ten", "hand")
-)
-# Variants of SGIM-D on the rod with and without a forward model. A name with the ending -arm-7 or -arm-50 has the same
-# options on a planar arm.
-MODEL: Final[Variant] = {**SGIM_D, "inverse": "model-alone"}
-REFINING: Final[dict[str, Variant]] = {
-    "sgim-d": SGIM_D,
-    "model": MODEL,
-    "gradient": {**MODEL, "search": "gradient"},
-}
-SWIMMER: Final[Variant] = {"environment": "swimmer", **SHORT}  # a robot of gymnasium
-# Learners of the suite besides `practice`.
-SUITED: Final[dict[str, Variant]] = {
-    **REFERENCES,
-    "practice-uniform": UNIFORM_PRACTICE,
-    "cma-mae": {"algorithm": "cma-mae"},
-    "map-elites": {"algorithm": "map-elites"},
-}
-ON_ROD: Final[Variant] = {"evaluate_at": (250, 500, 1000, 2000), "floor_at": (5000,)}
+SCHOOL: Final = ("map-elites", "cma-mae")  # algorithms of quality diversity; they take no context
+CORNER, MANY = MADE = (Path("corner.npz"), Path("many.npz"))  # files of demonstrations that ``make_subsets`` writes
 ONCE: Final[Variant] = {"teacher": "initial", "teacher.every": 1}  # at the start, one demonstration a movement
-TAUGHT: Final[Variant] = {**UNIFORM_PRACTICE, "algorithm": "practice-taught", **ONCE}
-# Learners on the rod: the suite's learners, and rivals with and without demonstrations.
-LEARNING: Final[dict[str, Variant]] = {
-    f"{name}.rod": {**line, **ON_ROD}
-    for name, line in {
-        **SUITED,
-        "practice-taught": TAUGHT,
-        "practice-corner": {**TAUGHT, "demonstrations": CORNER},
-        "practice-shuffled": {**TAUGHT, "demonstrations": SHUFFLED},
-        "sagg-riac": SAGG_RIAC,
-        "sgim-d": SGIM_D,
-        "sgim-d-uniform": {**SGIM_D, "goals": "uniform"},
-        "uniform-nearest-taught": {**SGIM_D, **BASELINE},
-        "cma-mae-taught": {"algorithm": "cma-mae-taught"},
-        "cma-mae-taught-once": {"algorithm": "cma-mae-taught", "imitations": 1, **ONCE},
-        "map-elites-taught": {"algorithm": "map-elites-taught"},
-        "imitation": {"algorithm": "imitation", "inverse": "model"},
-    }.items()
+PRACTICE: Final[Variant] = {"algorithm": "practice"}
+TAUGHT: Final[Variant] = {"algorithm": "practice-taught", **ONCE}
+UNTAUGHT: Final[dict[str, Variant]] = {
+    "random": {"algorithm": "random"},
+    UNIFORM: REFERENCES[UNIFORM],
+    "map-elites": {"algorithm": "map-elites"},
+    "cma-mae": {"algorithm": "cma-mae"},
 }
-# Steps from the standard baseline to `practice` that are not in LEARNING, and learners with another teaching schedule.
+# Steps from the standard baseline to `practice`.
 MIDDLE: Final[Variant] = {**REFERENCES[UNIFORM], "explore": "widening", "global_range": (0.02, 0.3)}
-BEGUN: Final[dict[str, Variant]] = {"middle": MIDDLE, "middle-process": {**MIDDLE, "inverse": "process"}}
-STEPS_OF_GAIN: Final[dict[str, Variant]] = {
-    **BEGUN,
-    "middle-random": {**MIDDLE, "inverse": "process", "global_range": (1.0, 1.0)},
-    "middle-map-elites": {"algorithm": "experiments.parts:map_elites_middle"},
-    "home-babbling": {"algorithm": "experiments.home_babbling:home_babbling"},
-    "practice-interest": {**UNIFORM_PRACTICE, "goals": "interest-map"},
+# SGIM-D with a forward model that answers once it predicts as well as `process`, and with one that always answers.
+MODEL: Final[dict[str, Variant]] = {
+    "sgim-d-model": {**SGIM_D, "inverse": "model", "search": "gradient"},
+    "sgim-d-model-alone": {**SGIM_D, "inverse": "model-alone", "search": "gradient"},
 }
-SCHEDULES: Final[dict[str, Variant]] = {
-    "practice-taught-every-30": {**TAUGHT, "teacher": "periodic", "teacher.every": 30, "social.repeats": 10},
-    "sgim-d-once": {**SGIM_D, **ONCE, "social.repeats": 1},
-    "uniform-nearest-taught-once": {**SGIM_D, **BASELINE, **ONCE, "social.repeats": 1},
-    "map-elites-taught-once": {"algorithm": "map-elites-taught", "imitations": 1, **ONCE},
-}
-# Options of a short run in which ten lessons come early, as a person would give them.
-SESSION: Final[Variant] = {"movements": 1000, "evaluate_at": (300, 500)}  # a run is also evaluated at its end
-SHOWN: Final[dict[str, Variant]] = {"goals": {**SGIM_D, "teacher": "initial"}, "practice": TAUGHT}
-LONGER: Final[Variant] = {"inverse.rate": 2.0}  # more training, because movements of a planar arm take no time
 
 # Learners that ask.
 IM: Final[Variant] = {"algorithm": "sgim-im"}
 ACTS: Final[Variant] = {"algorithm": "sgim-acts"}
 FOUR: Final = ("demonstrator-1", "demonstrator-2", "demonstrator-3", "mislabelling")
 HALVES: Final = ("low-half", "high-half")
-TOSS: Final[Variant] = {"environment": "toss", **SHORT}
-ASKING: Final[dict[str, Variant]] = {
-    "taught-every-30": SGIM_D,
-    "taught-at-start": {**SGIM_D, "teacher": "initial"},
-    "taught-at-start-once": TAUGHT,
-    "alone": UNIFORM_PRACTICE,
-    "sgim-im": IM,
-    "sgim-im-83": {**IM, "demonstrations": MANY},
-    "sgim-im-cost-10": {**IM, "cost": 10.0},
-    "sgim-im-search": {"algorithm": "sgim-im-search"},
-    **{f"sgim-acts-{number}": {**ACTS, "teachers": (f"demonstrator-{number}",)} for number in (1, 2, 3)},
-    "sgim-acts-four": {**ACTS, "teachers": FOUR},
-    "sgim-acts-four-search": {"algorithm": "sgim-acts-search", "teachers": FOUR},
-    "sgim-acts-halves": {**ACTS, "teachers": HALVES},
-    "sgim-eer": {"algorithm": "sgim-eer"},
-    "alone-toss": {**UNIFORM_PRACTICE, **TOSS},
-    "alone-toss-blind": {**UNIFORM_PRACTICE, **TOSS, "environment": "experiments.parts:blind_toss"},
-    "sgim-im-toss": {**IM, **TOSS},
-}
-
-# Settings on which no default was tuned, each with its changed options. A variant is named like sgim-d@noise-twice.
-ROBOTS: Final[dict[str, Variant]] = {
-    "as-it-is": {},
-    "noise-none": {"environment.noise": 0.0},
-    "noise-twice": {"environment.noise": 0.064},
-    "longer-line": {"environment": "rod-long"},
-    "swimmer": {"environment": "swimmer"},
-}
-TEACHERS: Final[dict[str, Variant]] = {
-    "13-shown": {"demonstrations": FEW},
-    "one-corner": {"demonstrations": CORNER},
-    "shuffled": {"demonstrations": SHUFFLED},
-}
-PRACTICE: Final[Variant] = {"algorithm": "practice"}
-PROVED_MODEL: Final[Variant] = {"inverse": "model"}  # the model answers once it predicts as well as `process`
-BY_PROOF: Final[Variant] = {**SGIM_D, **PROVED_MODEL, "search": "gradient"}
-UNTAUGHT: Final[dict[str, Variant]] = {
-    "random": {"algorithm": "random"},
-    "uniform": {**SAGG_RIAC, **BASELINE},
-    "sagg-riac": SAGG_RIAC,
-    "sagg-riac-uniform": {**SAGG_RIAC, "goals": "uniform"},
-    "sagg-riac-model": {**SAGG_RIAC, **PROVED_MODEL},
-    "practice": UNIFORM_PRACTICE,
-}
-TAUGHT_ALIKE: Final[dict[str, Variant]] = {
-    "uniform-taught": {**SGIM_D, **BASELINE},
-    "sgim-d": SGIM_D,
-    "sgim-d-uniform": {**SGIM_D, "goals": "uniform"},
-    "sgim-d-model": {**SGIM_D, **PROVED_MODEL},
-    "practice-taught": TAUGHT,
-}
-EVERYWHERE: Final[Variant] = {"movements": 2000, "evaluate_at": (500,)}
 
 
 def _of_teacher(teacher: int, ending: str = "") -> dict[str, Variant]:
@@ -203,163 +85,146 @@ def _of_teacher(teacher: int, ending: str = "") -> dict[str, Variant]:
             "algorithm": algorithm,
             "demonstrations": SHIPPED.with_name(f"demonstrator_{teacher}.npz"),
             **(options if ending else {}),
+            **END,
         }
         for algorithm, options in letter.items()
     }
 
 
-def _on_arm(arm: str) -> dict[str, Variant]:
-    short = arm.removeprefix("planar-")
-    return {
-        f"{name}-{short}": {
-            **(LONGER if "inverse" in line else {}),
-            **line,
-            "environment": arm,
-            **SHORT,
-        }
-        for name, line in REFINING.items()
-    }
-
-
-def _on_suite(learners: dict[str, Variant], tasks: Iterable[str] = SUITE) -> dict[str, Variant]:
-    """Each learner on all tasks, except the rod (its runs are longer) and the toss if the learner takes no context."""
+def _on_tasks(learners: dict[str, Variant], tasks: Iterable[str]) -> dict[str, Variant]:
+    """Each learner on each task except the rod, and except the toss if the learner takes no context."""
     return {
         f"{name}.{task}": {**line, **TASKS[task].options, **SHORT}
         for task in tasks
         for name, line in learners.items()
-        if task != "rod" and not (name in SCHOOL and task == "toss")
+        if task != ROD and not (name in SCHOOL and task == "toss")
     }
 
 
 def _ladder(ending: str, where: Variant) -> dict[str, Variant]:
     """The steps between the letter of the paper, ``sgim-d-letter``, and our defaults, ``sgim-d``."""
-    found, line = {}, {**SGIM_D, **LETTER, **where}
+    found, line = {}, {**SGIM_D, **LETTER, **where, **END}
     for number, (step, _, becomes) in enumerate(STEPS[:-1], 1):
         found[f"ladder-{number}-{step}{ending}"] = line = {**line, **becomes}
     return found
 
 
 EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
-    "learners": {name: {"algorithm": name} for name in ("random", "sagg-riac", "observation", "imitation", "sgim-d")},
-    "teachers": {**_of_teacher(1), **_of_teacher(2)},
-    "large-space": {
-        "sagg-riac-large": {**SAGG_RIAC, **LARGE},
-        "sgim-d-large": {**SGIM_D, **LARGE},
-        "sgim-d-uniform-large": {**SGIM_D, **LARGE, "goals": "uniform"},
-        "sgim-d-absolute-large": {**SGIM_D, **LARGE, "goals.progress": "absolute"},
-        "random-goals-demonstrations-large": {**SGIM_D, **BASELINE, **LARGE},
-        "sagg-riac-letter-large": {**SAGG_RIAC, **LETTER, **LARGE},
-        "sgim-d-letter-large": {**SGIM_D, **LETTER, **LARGE},
+    "paper": {
+        **{name: {"algorithm": name, **WHOLE} for name in ("random", "sagg-riac", "observation", "imitation")},
+        "sgim-d": {**SGIM_D, **WHOLE, **FLOOR},
     },
     "letter": {
-        f"{algorithm}-letter": {"algorithm": algorithm, **(LETTER if algorithm in ("sagg-riac", "sgim-d") else INVERSE)}
-        for algorithm in ("sagg-riac", "observation", "imitation", "sgim-d")
+        "sagg-riac-letter": {**SAGG_RIAC, **LETTER, **WHOLE},
+        "observation-letter": {"algorithm": "observation", **INVERSE, **WHOLE},
+        "imitation-letter": {"algorithm": "imitation", **INVERSE, **WHOLE},
+        "sgim-d-letter": {**SGIM_D, **LETTER, **WHOLE, **FLOOR},
     },
-    "letter-teachers": {**_of_teacher(1, "-letter"), **_of_teacher(2, "-letter")},
-    "ladder": _ladder("", {}),
-    "ladder-large": _ladder("-large", LARGE),
-    "ablations": {
-        "uniform-goals": {**SGIM_D, "goals": "uniform"},
-        "grid": {**SGIM_D, "goals": "grid"},
-        "alp-gmm": {**SGIM_D, "goals": "alp-gmm"},
-        "absolute-progress": {**SGIM_D, "goals.progress": "absolute"},
-        "paired-progress": {**SGIM_D, "goals.progress": "paired"},
-        "attempt-competence": {**SGIM_D, "goals.progress": "absolute", "judge": "attempt"},
-        "search-nelder-mead-exact": {**SGIM_D, **EXACT},
-        "search-perturb": {**SGIM_D, "search": "perturb"},
-        "search-cma-es": {**SGIM_D, "search": "cma-es"},
+    "large": {
+        name: {**line, **LARGE, **WHOLE}
+        for name, line in {
+            "sagg-riac-large": SAGG_RIAC,
+            "sgim-d-large": SGIM_D,
+            "sgim-d-uniform-large": {**SGIM_D, "goals": "uniform"},
+            "sgim-d-absolute-large": {**SGIM_D, "goals.progress": "absolute"},
+            "uniform-nearest-taught-large": {**SGIM_D, **BASELINE},
+            "sagg-riac-letter-large": {**SAGG_RIAC, **LETTER},
+            "sgim-d-letter-large": {**SGIM_D, **LETTER},
+        }.items()
     },
-    "baselines": {  # baselines that are not in LEARNING
-        "demonstrations-noise": {"algorithm": "imitation", "teacher.choose": "random"},
-        **{name: {"algorithm": name} for name in ("isoline", "cma-me")},
-        **{f"{name}-demonstrations": {"algorithm": f"{name}-taught"} for name in ("isoline", "cma-me")},
-        # Rivals with tuned settings: better than the defaults in a search on other seeds, see results/RIVALS.md.
-        "map-elites-tuned": {"algorithm": "map-elites", "cells": 10},
-        "cma-me-tuned": {"algorithm": "cma-me", "sd": 0.05},
-        "cma-mae-demonstrations-tuned": {"algorithm": "cma-mae-taught", "sd": 0.05},
+    "teachers": {
+        name: line
+        for ending in ("", "-letter")
+        for teacher in (1, 2)
+        for name, line in _of_teacher(teacher, ending).items()
     },
-    "teaching": {
-        "every-10": {**SGIM_D, "teacher.every": 10},
-        "every-100": {**SGIM_D, "teacher.every": 100},
-        "initial": {**SGIM_D, "teacher": "initial"},
-        "asked": {**SGIM_D, "teacher": "asked"},
-        "few-demonstrations": {**SGIM_D, "demonstrations": FEW},
-        "half-plane": {**SGIM_D, "demonstrations": HALF},
+    "ladder": {**_ladder("", {}), **_ladder("-large", LARGE)},
+    "rivals": {
+        name: {**line, **WHOLE}
+        for name, line in {
+            **{name: line for name, line in UNTAUGHT.items() if name != "random"},
+            "uniform-nearest-taught": {**SGIM_D, **BASELINE},
+            "uniform-nearest-taught-once": {**SGIM_D, **BASELINE, **ONCE, "social.repeats": 1},
+            "sgim-d-uniform": {**SGIM_D, "goals": "uniform"},
+            "sgim-d-once": {**SGIM_D, **ONCE, "social.repeats": 1},
+            "cma-mae-taught": {"algorithm": "cma-mae-taught"},
+            "cma-mae-taught-once": {"algorithm": "cma-mae-taught", "imitations": 1, **ONCE},
+            "map-elites-taught": {"algorithm": "map-elites-taught"},
+            "map-elites-taught-once": {"algorithm": "map-elites-taught", "imitations": 1, **ONCE},
+            "cma-me": {"algorithm": "cma-me"},
+            "cma-me-taught": {"algorithm": "cma-me-taught"},
+            # Rivals with tuned settings: better than the defaults in a search on other seeds, see results/TUNING.md.
+            "map-elites-tuned": {"algorithm": "map-elites", "cells": 10},
+            "cma-me-tuned": {"algorithm": "cma-me", "sd": 0.05},
+            "cma-mae-taught-tuned": {"algorithm": "cma-mae-taught", "sd": 0.05},
+            "home-babbling": {"algorithm": "experiments.home_babbling:home_babbling"},
+            "random-middle": {**MIDDLE, "inverse": "process", "global_range": (1.0, 1.0)},
+            "map-elites-middle": {"algorithm": "experiments.parts:map_elites_middle"},
+            "middle": MIDDLE,
+            "middle-process": {**MIDDLE, "inverse": "process"},
+        }.items()
     },
-    "asking": ASKING,
-    "forward-model": REFINING,
-    **{arm: _on_arm(arm) for arm in ARMS},
-    "swimmer": {
-        **{f"{name}-swimmer": {"algorithm": name, "inverse": "linear", **SWIMMER} for name in SWIMMERS},
-        "practice-swimmer": {**UNIFORM_PRACTICE, **SWIMMER},
+    "suite": _on_tasks(UNTAUGHT, TASKS) | _on_tasks({"sagg-riac": SAGG_RIAC}, SPARSE),
+    "model": {
+        **{name: {**line, **WHOLE} for name, line in MODEL.items()},
+        **_on_tasks({"sgim-d": SGIM_D, "sgim-d-model": MODEL["sgim-d-model"]}, ARMS),
     },
-    "by-hand": {
-        "goals-alone": {**SAGG_RIAC, **SESSION},
-        "practice-alone": {**UNIFORM_PRACTICE, **SESSION},
-        **{f"{name}-by-hand": {**line, **SESSION, "demonstrations": HAND} for name, line in SHOWN.items()},
-        **{f"{name}-ten-shipped": {**line, **SESSION, "demonstrations": TEN} for name, line in SHOWN.items()},
-    },
-    "settings": {
-        f"{name}@{setting}": {**line, **change, **EVERYWHERE}
-        for setting, change in {**ROBOTS, **TEACHERS}.items()
-        for name, line in {**(UNTAUGHT if setting in ROBOTS else {}), **TAUGHT_ALIKE}.items()
-    },
-    "learning": LEARNING,
-    "suite": _on_suite(SUITED),
     "practice": {
-        "practice.rod": {**PRACTICE, **ON_ROD},
-        **_on_suite({"practice": PRACTICE}),
+        **{
+            name: {**line, **WHOLE}
+            for name, line in {
+                "practice": PRACTICE,
+                "practice-uniform": {**PRACTICE, "goals": "uniform"},
+                "practice-interest": {**PRACTICE, "goals": "interest-map"},
+                "practice-taught-every-30": {
+                    **TAUGHT,
+                    "teacher": "periodic",
+                    "teacher.every": 30,
+                    "social.repeats": 10,
+                },
+                "practice-corner": {**TAUGHT, "demonstrations": CORNER},
+            }.items()
+        },
+        "practice-taught": {**TAUGHT, **WHOLE, **FLOOR},
+        **_on_tasks({"practice": PRACTICE}, TASKS),
     },
-    "sparse": _on_suite({"practice": PRACTICE, **REFERENCES, "sagg-riac": SAGG_RIAC}, SPARSE),
-    "proved-model": {"sgim-d-model.rod": {**BY_PROOF, **ON_ROD}, **_on_suite({"sgim-d-model": BY_PROOF}, ARMS)},
-    "gain": {
-        **{f"{name}.rod": {**line, **ON_ROD} for name, line in {**STEPS_OF_GAIN, **SCHEDULES}.items()},
-        **_on_suite(BEGUN),
+    "asking": {
+        **{
+            name: {**line, **WHOLE}
+            for name, line in {
+                "sgim-d-initial": {**SGIM_D, "teacher": "initial"},
+                "sgim-im": IM,
+                "sgim-im-83": {**IM, "demonstrations": MANY},
+                "sgim-im-cost-10": {**IM, "cost": 10.0},
+                **{f"sgim-acts-{number}": {**ACTS, "teachers": (f"demonstrator-{number}",)} for number in (1, 2)},
+                "sgim-acts-four": {**ACTS, "teachers": FOUR},
+                "sgim-acts-halves": {**ACTS, "teachers": HALVES},
+                "sgim-eer": {"algorithm": "sgim-eer"},
+            }.items()
+        },
+        "sgim-im.toss": {**IM, **TASKS["toss"].options, **SHORT},
+        "practice.toss-blind": {**PRACTICE, "environment": "experiments.parts:blind_toss", **SHORT},
     },
 }
-
-
-# Seeds of each page. They were first used after the defaults had been frozen.
-SEEDS: Final[dict[str, range]] = {
-    **dict.fromkeys(("learners", "large-space", "letter", "ladder", "ladder-large", "baselines"), range(100, 120)),
-    **dict.fromkeys(("teachers", "letter-teachers", "ablations", "teaching"), range(100, 110)),
-    **dict.fromkeys(("forward-model", *ARMS, "swimmer"), range(100, 110)),
-    "settings": range(100, 105),
-    **dict.fromkeys(("learning", "suite", "gain"), range(120, 140)),
-    "sparse": range(160, 180),
-    "practice": range(220, 240),
-    "proved-model": range(180, 200),
-    "asking": range(140, 160),
-    "by-hand": range(150, 160),
+VARIANTS: Final = {name: line for variants in EXPERIMENTS.values() for name, line in variants.items()}
+# Seeds of each experiment. They were first used after the defaults had been frozen.
+SEEDS: Final = {
+    **dict.fromkeys(EXPERIMENTS, range(240, 250)),
+    **dict.fromkeys(("paper", "letter", "rivals", "practice", "suite"), range(240, 260)),
 }
+# The second table, beside results.csv, that gets rows from the runs of an experiment.
+SMALL_TABLES: Final = {"asking": "asked.csv", **dict.fromkeys(("paper", "letter", "large"), "explored.csv")}
 
 
-def seeds_of(experiment: str, variant: str) -> range:
-    """The seeds of a variant on its page."""
-    return SEEDS["learners" if (experiment, variant) == ("forward-model", "sgim-d") else experiment]
-
-
-def make_subsets(folder: Path, *, by_hand: bool = False) -> None:
-    """Write subsets of the shipped demonstrations; if ``by_hand``, write ten lessons by hand, too.
-
-    The subsets are the first 13, 83 and 10 of 127 demonstrations, those in the right half of the plane, the 20 nearest
-    to one corner, and all demonstrations with permuted outcomes, as a teacher who mislabels them would show.
+def make_subsets(folder: Path) -> None:
+    """Write subsets of the shipped demonstrations: the 20 nearest to one corner, and the first 83 of 127.
 
     Raises:
         OSError: a file cannot be written.
     """
     everything = load_demonstrations()
     outcomes = np.array([each.outcome for each in everything])
-    right = [each for each in everything if each.outcome[0] > 0]
-    corner = [everything[k] for k in np.linalg.norm(outcomes - outcomes.max(axis=0), axis=1).argsort()[:20]]
-    dealt = stream(0, "shuffled").permutation(outcomes)
-    shuffled = [replace(each, outcome=outcome) for each, outcome in zip(everything, dealt, strict=True)]
+    corner = np.linalg.norm(outcomes - outcomes.max(axis=0), axis=1).argsort()[:20]
     make_folder(folder)
-    # The shipped demonstrations are ordered so that the first ones already spread over the plane.
-    first = ((FEW, everything[:13]), (MANY, everything[:83]), (TEN, everything[:10]))
-    for name, chosen in (*first, (HALF, right), (CORNER, corner), (SHUFFLED, shuffled)):
-        save_demonstrations(folder / name, chosen)
-    if by_hand:
-        from hand import lessons_of_a_script  # imported here, as MuJoCo loads slowly
-
-        save_demonstrations(folder / HAND, [lesson.demonstration for lesson in lessons_of_a_script()])
+    save_demonstrations(folder / CORNER, [everything[k] for k in corner])
+    save_demonstrations(folder / MANY, everything[:83])  # they already spread over the plane

@@ -11,7 +11,7 @@ from variants import FOUR
 PAGES = {
     "paper": lambda found: claimed.paper(found, letter=False),
     "letter": lambda found: claimed.paper(found, letter=True),
-    **{name: getattr(claimed, name) for name in ("learning", "answers", "curiosity", "model", "asking")},
+    **{name: getattr(claimed, name) for name in ("learning", "curiosity", "model", "asking")},
 }
 
 
@@ -36,52 +36,46 @@ SPOILT = {
     "paper": PAPER,
     "letter": {claim: {lettered(name): factor for name, factor in change.items()} for claim, change in PAPER.items()},
     "learning": {
-        0: {"practice-taught.rod": {500: 1.4}},
-        1: {"practice-taught.rod": {5000: 1.8}},
-        3: {"cma-mae-taught-once.rod": {1000: 0.05}},
-        4: {"sgim-d.rod": {500: 0.3}},
-        5: {"practice-corner.rod": {250: 1.3}},
-        6: {"cma-mae.rod": 0.4},
+        0: {"practice-taught": {500: 1.4}},
+        1: {"practice-taught": {5000: 1.8}},
+        3: {"cma-mae-taught-once": {1000: 0.05}},
+        4: {"cma-mae-taught": {500: 0.05}},
+        5: {"practice-corner": {250: 1.3}},
+        6: {"cma-mae": 0.4},
         7: {"practice.rod-large": {500: 1.3}},
         8: {"practice.puck": {2000: 1.4}},
         9: {"sagg-riac.puck": 0.5},
-        10: {"uniform-nearest-taught.rod": 0.6},
+        10: {"uniform-nearest-taught": 0.2},
         11: {"practice.toss": {500: 2.2}},
         12: {"practice.swimmer": {250: 1.8}},
-        13: dict.fromkeys([f"uniform-nearest.{task}" for task in claimed.SUITE], 0.3),
-        14: {f"map-elites.{task}": {1000: 0.4} for task in claimed.SUITE},
+        13: dict.fromkeys([claimed.on("uniform-nearest", task) for task in claimed.SUITE], 0.3),
+        14: {claimed.on("map-elites", task): {1000: 0.4} for task in claimed.SUITE},
         15: {"practice.crawler": {2000: 4.0}},
     },
-    "answers": {
-        0: {"map-elites.spatial-arm by nearest": {1000: 0.5}},
-        1: {"cma-mae.rod by linear": {2000: 0.02}},
-    },
     "curiosity": {
-        0: {"sagg-riac.rod": 1.6},
-        1: {"sgim-d-uniform.rod": 0.8},
+        0: {"sagg-riac": 1.6},
+        1: {"sgim-d-uniform": 0.5},
         2: {"sgim-d-uniform-large": 0.7},
         3: {"sgim-d-absolute-large": 1.4},
-        4: {"random-goals-demonstrations-large": 0.5},
-        5: {"practice-interest.rod": {1000: 1.2}},
+        4: {"uniform-nearest-taught-large": 0.5},
+        5: {"practice-interest": {1000: 1.2}},
     },
     "model": {
-        0: {"sgim-d-model.rod by model": {2000: 2.0}},
+        0: {"sgim-d-model by model": {2000: 2.0}},
         1: {"sgim-d-model.planar-arm-7 by model": {500: 1.5}},
-        2: {"imitation.rod by model": {500: 1.1}},
-        **{at: {"gradient by model-alone": {1000: 2.0, 2000: 3.0, 3000: 3.0}} for at in (3, 4)},
-        5: {"gradient by model-alone": 3.0},
-        6: {"gradient-arm-50 by model-alone": 2.0},
+        **{at: {"sgim-d-model-alone by model-alone": {1000: 4.0, 2000: 4.0, 5000: 2.0}} for at in (2, 3)},
+        4: {"sgim-d-model-alone by model-alone": 3.0},
     },
     "asking": {
-        0: {"sgim-im": {1000: 2.0}},
-        1: {"taught-at-start": 0.6},
-        2: {"taught-at-start-once": 0.6},
-        3: {"sgim-im-83": 1.7},
+        0: {"sgim-im": {1000: 6.0}},
+        1: {"sgim-d-initial": 0.3},
+        2: {"practice-taught": 0.6},
+        3: {"sgim-im-83": 6.0},
         4: {"sgim-acts-2": 0.9},
-        8: {"sgim-im-cost-10": 1.8},
-        9: {"sgim-eer": {1000: 0.5}},
-        10: {"alone-toss-blind": {2000: 0.4}},
-        11: {"alone-toss": {1000: 0.4}},
+        8: {"sgim-im-cost-10": 6.0},
+        9: {"sgim-eer": {1000: 0.3}},
+        10: {"practice.toss-blind": {2000: 0.2}},
+        11: {"practice.toss": {1000: 0.3}},
     },
 }
 OTHERS = {  # spoilt by other than errors: the noise floor, counts of tiles, goals and requests
@@ -94,7 +88,7 @@ OTHERS = {  # spoilt by other than errors: the noise floor, counts of tiles, goa
     ("asking", 5): {"asked": {"sgim-acts-four": dict.fromkeys(FOUR, (50, 40, 20, 0, 0, 0))}},
     ("asking", 6): {"asked": {"sgim-acts-halves": dict.fromkeys(("low-half", "high-half"), (50, 40, 20, 14, 0, 0))}},
     ("asking", 7): {"asked": {"sgim-im-cost-10": {"all": (140, 112, 60, 60, 50, 40)}}},
-    ("asking", 12): {"asked": {"sgim-im-toss": {"all": (140, 110, 60, 60, 40, 50)}}},
+    ("asking", 12): {"asked": {"sgim-im.toss": {"all": (140, 110, 60, 60, 40, 50)}}},
 }  # fmt: skip
 CASES = [
     *((page, claim, {"spoilt": change}) for page, found in SPOILT.items() for claim, change in found.items()),
@@ -140,8 +134,8 @@ def test_what_was_not_run_is_named_and_the_other_claims_are_judged(tmp_path):
 
 
 def test_at_equal_cost_sgim_d_is_taken_between_its_evaluations(tmp_path):
-    """50 demonstrations at 10 make 5500 in all, which SGIM-D has spent after 4125 movements, a little after 4000."""
-    at_4125 = 0.046 * (0.8 + 0.2 * 5000 / 4000) * (1 - 0.125 * (1 - 1 / 1.05)) / 0.03
+    """50 demonstrations at 10 make 5500 in all, which SGIM-D has spent after 4125 movements, between 2000 and 5000."""
+    at_4125 = 0.08 * (1.3 - 0.3 * 2125 / 3000) / 0.019
     for factor, verdict in ((0.97, "holds"), (1.03, "fails")):
         found = Evidence.of(write_rows(tmp_path, {"sgim-im-cost-10": factor * at_4125}))
         (judged,) = judge([claimed.asking(found)[8]])
@@ -150,10 +144,7 @@ def test_at_equal_cost_sgim_d_is_taken_between_its_evaluations(tmp_path):
 
 def test_a_run_that_is_under_way_is_counted_where_it_was_evaluated(tmp_path):
     rows = [
-        row("learners", "sgim-d", seed, at, "process", 0.1)
-        for seed in range(SEEDS)
-        for at in MOVEMENTS
-        if (seed, at) != (0, 5000)
+        row("sgim-d", seed, at, "process", 0.1) for seed in range(SEEDS) for at in MOVEMENTS if (seed, at) != (0, 5000)
     ]
     write_rows(tmp_path)
     found = Evidence.of(write(tmp_path, rows))

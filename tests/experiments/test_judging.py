@@ -62,9 +62,7 @@ def test_a_claim_among_many_needs_more_certainty_than_one_alone(tmp_path):
     """Five seeds decide a claim alone; among all of a page, by Holm's method, they do not."""
     errors = {"ours": [0.1] * 5, "theirs": [0.105, 0.12, 0.0995, 0.11, 0.103]}
     rows = [
-        row("learners", name, seed, 5000, "process", value)
-        for name, found in errors.items()
-        for seed, value in enumerate(found)
+        row(name, seed, 5000, "process", value) for name, found in errors.items() for seed, value in enumerate(found)
     ]
     write_rows(tmp_path)
     found = Evidence.of(write(tmp_path, rows))

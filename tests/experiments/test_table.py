@@ -19,7 +19,7 @@ def test_a_shipped_table_read_and_written_again_keeps_every_byte(tmp_path, name)
 
 
 def test_a_row_made_again_takes_the_place_of_the_old_one_and_the_others_stay(tmp_path):
-    rows = [row("learners", "grid", seed, 20, "linear", 0.1 + 0.2) for seed in (1, 0)]
+    rows = [row("grid", seed, 20, "linear", 0.1 + 0.2) for seed in (1, 0)]
     merge(tmp_path, FILE, rows)
     merge(tmp_path, FILE, [{**rows[0], "error": 0.5}])
     table = read_table(tmp_path)
@@ -36,8 +36,8 @@ def test_without_a_file_a_table_is_empty_and_none_is_made(tmp_path):
 @pytest.mark.parametrize(
     ("spoil", "message"),
     [
-        (lambda text: text.replace("task,seed", "seed,task", 1), "must begin with experiment,variant"),
-        (lambda text: "", "must begin with experiment,variant"),
+        (lambda text: text.replace("seed,movements", "movements,seed", 1), "must begin with variant,seed"),
+        (lambda text: "", "must begin with variant,seed"),
         (lambda text: text.replace(",0,20,", ",0.5,20,"), "cannot be read"),
         (lambda text: text.replace("0.25", "much"), "cannot be read"),
         (lambda text: text.replace("0.25", ""), "line 2 makes no sense"),
@@ -47,7 +47,7 @@ def test_without_a_file_a_table_is_empty_and_none_is_made(tmp_path):
     ],
 )
 def test_a_table_that_makes_no_sense_is_refused_and_no_page_made(tmp_path, capsys, spoil, message):
-    write(tmp_path, [row("learners", "grid", 0, 20, "linear", 0.25)])
+    write(tmp_path, [row("grid", 0, 20, "linear", 0.25)])
     (tmp_path / FILE).write_text(spoil((tmp_path / FILE).read_text()))
     with pytest.raises(ResultsError, match=message):
         read_table(tmp_path)

@@ -3,11 +3,11 @@
 import numpy as np
 import pandas as pd
 
-from claimed import TIMES
+from claimed import SUITE, TIMES
 from table import FILE, TABLES, write_table
-from variants import EXPERIMENTS, FOUR, SPARSE, SUITE
+from variants import ARMS, EXPERIMENTS, FOUR, SPARSE
 
-MOVEMENTS = (*TIMES, 3000, 4000, 5000)
+MOVEMENTS = (*TIMES, 5000)
 SEEDS = 20
 LETTER = {  # errors (m) after 5000 movements; learners by the letter of the paper have equal errors
     "sagg-riac": 0.15,
@@ -21,8 +21,7 @@ LETTER = {  # errors (m) after 5000 movements; learners by the letter of the pap
     "sagg-riac-large": 0.19,
     "sgim-d-large": 0.09,
 }
-TAUGHT = ("practice-taught", "practice-corner", "practice-shuffled")
-ON_TASKS = {"practice-uniform": 1.0, "random-nearest": 2.0, "uniform-nearest": 1.5, "cma-mae": 1.4, "map-elites": 1.3}
+ON_TASKS = {"random": 2.0, "uniform-nearest": 1.5, "cma-mae": 1.4, "map-elites": 1.3}
 
 
 def lettered(name):
@@ -39,44 +38,34 @@ ERRORS = {  # errors (m) after 5000 movements by name, as in `Evidence`
     **{lettered(name): error for name, error in LETTER.items()},
     "sgim-d-uniform-large": 0.12,
     "sgim-d-absolute-large": 0.10,
-    "random-goals-demonstrations-large": 0.13,
+    "uniform-nearest-taught-large": 0.13,
     # Few movements, on the rod and on the suite.
-    **{f"{name}.rod": 0.3 for name in ("cma-mae-taught", "map-elites-taught", "imitation")},
-    **{f"{name}-once.rod": 0.3 for name in ("cma-mae-taught", "map-elites-taught", "uniform-nearest-taught", "sgim-d")},
-    "practice-taught-every-30.rod": 0.03,
-    **{f"{name}.rod": 0.02 for name in TAUGHT},
-    **dict.fromkeys(("practice.rod", "practice-uniform.rod"), 0.022),
-    "practice-interest.rod": 0.021,
-    "cma-mae.rod": 0.04,
-    "map-elites.rod": 0.05,
-    "uniform-nearest.rod": 0.08,
-    "random-nearest.rod": 0.10,
-    "sgim-d.rod": 0.045,
-    "sgim-d-uniform.rod": 0.05,
-    "sagg-riac.rod": 0.07,
-    "uniform-nearest-taught.rod": 0.06,
+    **dict.fromkeys(("cma-mae-taught", "map-elites-taught", "uniform-nearest-taught"), 0.3),
+    **{f"{name}-once": 0.3 for name in ("cma-mae-taught", "map-elites-taught", "uniform-nearest-taught", "sgim-d")},
+    "practice-taught-every-30": 0.03,
+    **dict.fromkeys(("practice-taught", "practice-corner"), 0.02),
+    **dict.fromkeys(("practice", "practice-uniform"), 0.022),
+    "practice-interest": 0.021,
+    "cma-mae": 0.04,
+    "map-elites": 0.05,
+    "uniform-nearest": 0.08,
+    "sgim-d-uniform": 0.10,
     **{f"{name}.{task}": error for name, error in ON_TASKS.items() for task in SUITE if task != "rod"},
     **{f"practice.{task}": 1.0 for task in (*SUITE, *SPARSE) if task != "rod"},
     "practice.rod-large": 0.022,
-    **{f"{name}.{task}": ON_TASKS[name] for name in ("random-nearest", "uniform-nearest") for task in SPARSE},
+    **{f"{name}.{task}": ON_TASKS[name] for name in ("random", "uniform-nearest") for task in SPARSE},
     **{f"sagg-riac.{task}": 1.5 for task in SPARSE},
     # With a forward model.
-    "imitation.rod by model": 0.3,
-    **{f"{name} by model-alone": 0.03 for name in ("model", "gradient")},
-    **{f"{name}-arm-50 by model-alone": 0.01 for name in ("model", "gradient")},
-    **{f"sgim-d-arm-{joints}": 0.03 for joints in (7, 50)},
-    **{f"sgim-d-model.{task} by model": 0.03 for task in ("rod", "planar-arm-7", "planar-arm-50")},
+    **{f"sgim-d-model{by}": 0.03 for by in ("-alone by model-alone", " by model")},
+    **{f"sgim-d.{arm}": 0.03 for arm in ARMS},
+    **{f"sgim-d-model.{arm} by model": 0.03 for arm in ARMS},
     # Learners that ask.
-    **dict.fromkeys(EXPERIMENTS["asking"], 0.03),
-    "taught-every-30": 0.046,
-    "taught-at-start": 0.045,
-    "taught-at-start-once": 0.044,
+    **dict.fromkeys(EXPERIMENTS["asking"], 0.019),
+    "sgim-d-initial": 0.045,
     "sgim-eer": 0.04,
-    "alone-toss": 0.046,
-    "alone-toss-blind": 0.05,
+    "sgim-im.toss": 0.5,
+    "practice.toss-blind": 1.4,
 }
-MEMORIES = [*EXPERIMENTS["suite"], *(f"{name}.rod" for name in ON_TASKS)]
-ERRORS |= {f"{name} by {answer}": 1.2 * ERRORS[name] for name in MEMORIES for answer in ("linear", "nearest")}
 ASKED = {  # variant: teacher: requests, shown, late, late_own, strong, weak
     **{name: {"all": (140, 110, 60, 60, 50, 40)} for name in EXPERIMENTS["asking"] if name.startswith("sgim")},
     "sgim-im-cost-10": {"all": (60, 50, 20, 20, 0, 0)},
@@ -96,9 +85,9 @@ def error(name, seed, movements, last=None):
     return (ERRORS[name] if last is None else last) * spread(name, seed) * (0.8 + 0.2 * 5000 / movements)
 
 
-def row(experiment, variant, seed, movements, answer, error, floor=None, task="fishing-rod"):
+def row(variant, seed, movements, answer, error, floor=None, task="fishing-rod"):
     """A row of results.csv."""
-    values = (experiment, variant, task, seed, movements, answer, error, floor)
+    values = (variant, seed, movements, answer, task, error, floor)
     return dict(zip(TABLES[FILE][1], values, strict=True))
 
 
@@ -124,7 +113,7 @@ def write_rows(folder, spoilt=None, without=(), floor=0.98, asked=None, explored
             for movements in MOVEMENTS:
                 factor = factors if np.isscalar(factors) else factors.get(movements, 1.0)
                 value = factor * error(name, seed, movements)
-                rows.append(row("learners", variant, seed, movements, answer or "process", value, floor * value))
+                rows.append(row(variant, seed, movements, answer or "process", value, floor * value))
     requests = [
         (variant, seed, teacher, found[0] + seed % 3, *found[1:])
         for variant, teachers in {**ASKED, **(asked or {})}.items()
