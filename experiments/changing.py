@@ -1,40 +1,52 @@
 """Robots that change: errors after a change, with what was learnt before, beside a learner that starts anew.
 
-    experiments/changing.py --tasks planar-arm-7 toss --changes offset-0.1 gain --seeds 1000 1001 --out changing.jsonl
-    experiments/changing.py --unchanged --seeds 1000 --out unchanged.jsonl    # false alarms
+    experiments/changing.py                                                  the lives of the page CHANGES
+    experiments/changing.py --robots toss --changes gain --seeds 1000 1001 --results development
 
-Every life is a line of the file; lives that are there already are not made again. One process uses one core.
+The learner is `practice`. What it learnt before may also come from a simulator: "simulator" is the arm of
+docs/how-to/sim-to-real.md, and the learner "wrong" begins with a simulator that mirrors the outcomes.
 """
 
 from __future__ import annotations
 
-import argparse
-import json
-from collections.abc import Callable
+import re
+import subprocess
+import sys
+from collections.abc import Collection, Iterable, Sequence
 from functools import partial
 from itertools import product
 from pathlib import Path
-from typing import Any, Final
+from tempfile import TemporaryDirectory
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from random_robots import RandomRobot
-from sgimd_torch.algorithms.paper import sagg_riac
+from lives import make_lives, parser
 from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.catalogue import load_word
+from sgimd_torch.environments.mujoco_robot import MujocoRobot
 from sgimd_torch.environments.protocol import Environment
-from sgimd_torch.evaluation import evaluate
+from sgimd_torch.evaluation import evaluate, tile_goals, tile_side
 from sgimd_torch.learner import Learner
+from sgimd_torch.memory import Memory
+from sgimd_torch.runs.process import command
 from sgimd_torch.runs.tasks import benchmark_of
 from sgimd_torch.session import run
-from sgimd_torch.spaces import Array
+from sgimd_torch.spaces import Array, stream
 
 AFTER: Final = (100, 250, 500, 1000)  # movements after the change at which a learner is evaluated
+BEGUN: Final = (50, *AFTER)  # movements after a simulator
 GOALS: Final = 48  # largest number of goals of an evaluation
 GRADUAL, UNDONE = 2000, 500  # movements in which a gradual change grows; after which a change is undone
-ALGORITHMS: Final = {"practice": practice, "sagg-riac": sagg_riac}
-LEARNERS: Final = ("changes", "anew", "blind")  # notices changes; begins after the change; does not notice changes
+ROBOTS: Final = {"planar-arm-7": 1000, "fishing-rod": 500, "toss": 1000, "crawler": 1000}  # movements before a change
+CHANGES: Final = ("offset-0.1", "offset-0.02", "gain", "stuck", "mirrored", "gradual", "undone", "noise")
+GOES_ON, ANEW, BLIND, WRONG = "goes-on", "anew", "blind", "wrong"  # learners; the blind one goes on and notices nothing
+ARM, SIMULATOR = "mujoco-arm", "simulator"  # the arm of docs/how-to/sim-to-real.md, and what changes there
+SIMULATED: Final = 2000  # movements in the simulator
+SEEDS: Final = range(240, 246)
+TABLE: Final = "changes.csv"
+PAGE: Final = Path(__file__).parents[1] / "docs" / "how-to" / "sim-to-real.md"
 
 
 class Changing:
@@ -54,20 +66,16 @@ class Changing:
         if since < 0 or self.change == "none" or (self.change == "undone" and since >= UNDONE):
             return self.robot.execute(context, theta, rng)
         box, theta = self.policies, np.array(theta, dtype=np.float64)
-        middle, upper = (box.low + box.high) / 2, theta[0] > (box.low + box.high)[0] / 2
+        middle = (box.low + box.high) / 2
         match self.change:
             case "offset" | "undone":
                 theta += float(self.size or 0.1) * box.sides
             case "gradual":
                 theta += 0.1 * min(1.0, since / GRADUAL) * box.sides
-            case "local" if upper:
-                theta += 0.1 * box.sides
             case "gain":
                 theta = middle + 0.8 * (theta - middle)
             case "stuck":
                 theta[1] = box.low[1] + 0.7 * box.sides[1]
-            case "reversed":
-                theta = box.low + (theta[::-1] - box.low[::-1]) * (box.sides / box.sides[::-1])
             case "mirrored":
                 theta = 2 * middle - theta
         outcome = self.robot.execute(context, box.clip(theta), rng)
@@ -78,72 +86,90 @@ class Changing:
         return outcome
 
 
-def life(task: str, change: str, seed: int, learner: str, algorithm: str, before: int) -> dict[str, Any]:
-    """Errors of one life, by number of movements after the change."""
-    made = load_word("environment", task)()
-    robot, goals = made.environment, benchmark_of(made, None)[0].goals
-    goals = goals[:: 1 + len(goals) // GOALS]
-    at = 0 if learner == "anew" else before
-    world = Changing(robot, "none" if learner == "anew" and change == "undone" else change, at)
-    last = max(AFTER) if task != "fishing-rod" else 500
-    counts = [*AFTER, 2000, 2500] if change == "gradual" else [n for n in AFTER if n <= last]
-    counts = [UNDONE * (change == "undone" and learner != "anew") + n for n in counts]
-    robotic = ALGORITHMS[algorithm](world, seed + 50 * (learner == "anew"))
-    if learner == "blind":
+def life(name: str, change: str, learner: str, seed: int) -> dict[int, tuple[float, int]]:
+    """Errors by number of movements after the change, and how many changes the learner has noticed by then."""
+    if change == SIMULATOR:
+        return life_after_simulator(learner, seed)
+    made, anew = load_word("environment", name)(), learner == ANEW
+    goals = benchmark_of(made, None)[0].goals
+    at = 0 if anew else ROBOTS[name]
+    world = Changing(made.environment, "none" if anew and change == "undone" else change, at)
+    robotic = practice(world, seed + 50 * anew)
+    if learner == BLIND:
         robotic.watcher = None
-    errors = {}
-    for episode in run(robotic, world, seed, movements=at + counts[-1]):
-        world.made = episode.index + 1
-        if world.made - at in counts:
-            errors[world.made - at] = error(robotic, world, goals)
-    return {"errors": errors, "changes": [tuple(each) for each in robotic.changes]}
+    start = at + UNDONE * (change == "undone" and not anew)
+    return errors(robotic, world, seed, goals[:: 1 + len(goals) // GOALS], start, after(name))
 
 
-def error(learner: Learner, world: Environment, goals: Array) -> float:
-    """Mean error at the goals, in the unit of T."""
-    return round(evaluate(learner.inverse, world, goals, 1, step=learner.movements, repeats=0).mean_error, 5)
-
-
-def unchanged(task: str, seed: int, algorithm: str) -> dict[str, Any]:
-    """Alarms in 2000 movements of a robot that does not change; ``task`` may be the number of a random robot."""
-    world: Environment = RandomRobot(int(task)) if task.isdigit() else load_word("environment", task)().environment
-    learner = ALGORITHMS[algorithm](world, seed)
-    for _ in run(learner, world, seed, movements=2000):
+def life_after_simulator(learner: str, seed: int) -> dict[int, tuple[float, int]]:
+    """Errors on the real arm of docs/how-to/sim-to-real.md, at goals that the simulated arm has reached."""
+    with TemporaryDirectory() as folder:
+        program = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)[0]
+        subprocess.run([sys.executable, "-c", program], cwd=folder, check=True)  # writes both models
+        arm = partial(MujocoRobot, outcome="site:tip:xy", low=(-1, -1), high=(1, 1))
+        simulated, real = arm(Path(folder, "model.xml")), arm(Path(folder, "real.xml"), noise=0.005)
+    past = practice(simulated, seed)
+    for _ in run(past, simulated, seed, movements=SIMULATED):
         pass
-    return {"changes": [tuple(each) for each in learner.changes]}
+    outcomes = past.memory.outcomes
+    side = tile_side(outcomes, simulated.outcomes, 2 * GOALS)
+    goals = tile_goals(outcomes, simulated.outcomes, side, stream(seed, "benchmark"))
+    prior = Memory(0, simulated.policies.dim, simulated.outcomes.dim)
+    prior.extend(past.memory.contexts, past.memory.thetas, outcomes * ((-1, 1) if learner == WRONG else 1))
+    return errors(practice(real, seed, prior=None if learner == ANEW else prior), real, seed, goals, 0, BEGUN)
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--tasks", nargs="+", default=["planar-arm-7"])
-    parser.add_argument("--changes", nargs="+", default=["offset-0.1"])
-    parser.add_argument("--seeds", nargs="+", type=int, default=[1000])
-    parser.add_argument("--learners", nargs="+", default=list(LEARNERS[:2]), choices=LEARNERS)
-    parser.add_argument("--algorithms", nargs="+", default=["practice"], choices=ALGORITHMS)
-    parser.add_argument("--before", type=int, default=1000, help="movements before the change")
-    parser.add_argument("--unchanged", action="store_true", help="count false alarms instead")
-    parser.add_argument("--out", type=Path, default=Path("changing.jsonl"))
-    options = parser.parse_args()
-    known = (
-        {tuple(json.loads(line)["life"]) for line in options.out.read_text().splitlines()}
-        if options.out.exists()
-        else set()
-    )
-    lives: dict[tuple[Any, ...], Callable[[], dict[str, Any]]] = {}
-    for task, seed, algorithm in product(options.tasks, options.seeds, options.algorithms):
-        if options.unchanged:
-            lives[task, seed, algorithm] = partial(unchanged, task, seed, algorithm)
-            continue
-        for change, learner in product(options.changes, options.learners):
-            key = task, change, seed, learner, algorithm, options.before
-            lives[key] = partial(life, *key)
-    for key, made in lives.items():
-        if key not in known:
-            line = json.dumps({"life": key, **made()})
-            print(line, flush=True)
-            with options.out.open("a") as file:
-                file.write(line + "\n")
+def errors(
+    learner: Learner, world: Environment, seed: int, goals: Array, start: int, counts: Collection[int]
+) -> dict[int, tuple[float, int]]:
+    """Mean error at the goals (unit of T), and changes noticed, by number of movements after the first ``start``."""
+    found = {}
+    for episode in run(learner, world, seed, movements=start + max(counts)):
+        made = episode.index + 1
+        if isinstance(world, Changing):
+            world.made = made
+        if made - start in counts:
+            evaluation = evaluate(learner.inverse, world, goals, 1, step=made, repeats=0)
+            found[made - start] = evaluation.mean_error, len(learner.changes)
+    return found
+
+
+def after(robot: str) -> tuple[int, ...]:
+    """Numbers of movements after a change at which a learner on this robot is evaluated."""
+    return tuple(n for n in AFTER if n <= ROBOTS[robot])
+
+
+def learners(change: str) -> tuple[str, ...]:
+    """The learners of a page for this change."""
+    return {"noise": (GOES_ON, ANEW, BLIND), SIMULATOR: (GOES_ON, ANEW, WRONG)}.get(change, (GOES_ON, ANEW))
+
+
+def make(
+    results: Path,
+    processes: int,
+    seeds: Iterable[int] = SEEDS,
+    robots: Collection[str] = (*ROBOTS, ARM),
+    changes: Collection[str] = (*CHANGES, SIMULATOR),
+) -> None:
+    """Make the lives that the table in ``results`` lacks."""
+    lives = {}
+    for seed, robot, change in product(seeds, robots, changes):
+        for learner in learners(change) if (robot == ARM) == (change == SIMULATOR) else ():
+            before = SIMULATED if robot == ARM else ROBOTS[robot] * (learner != ANEW)
+            lives[robot, change, learner, seed] = before + (BEGUN if robot == ARM else after(robot))[-1]
+    make_lives(results, TABLE, life, lives, processes)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    options = parser(__doc__)
+    robots, changes = [*ROBOTS, ARM], [*CHANGES, SIMULATOR]
+    options.add_argument("--robots", nargs="+", default=robots, choices=robots, help="robots (default: all)")
+    options.add_argument("--changes", nargs="+", default=changes, choices=changes, help="changes (default: all)")
+    options.add_argument("--seeds", nargs="+", type=int, default=[*SEEDS], help="seeds (default: those of the page)")
+    chosen = options.parse_args(argv)
+    make(chosen.results, chosen.processes, chosen.seeds, chosen.robots, chosen.changes)
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(command(main))

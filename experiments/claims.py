@@ -24,6 +24,7 @@ with loading():  # Ctrl-C shows no traceback
     import jinja2
 
     import claimed
+    import robots
     from evidence import Evidence
     from page_tables import Page
     from sgimd_torch.files import make_folder, write_text
@@ -41,7 +42,7 @@ def filled(name: str, found: Evidence, folder: Path) -> tuple[str, Page]:
     loader = jinja2.FileSystemLoader(TEMPLATES)
     environment = jinja2.Environment(loader=loader, undefined=jinja2.StrictUndefined, keep_trailing_newline=True)
     page = Page(found, folder)
-    return environment.get_template(f"{name}.md.j2").render(page=page, claimed=claimed), page
+    return environment.get_template(f"{name}.md.j2").render(page=page, claimed=claimed, robots=robots), page
 
 
 def into_readme(text: str, section: str) -> str:

@@ -45,11 +45,15 @@ class Evidence:
     Args:
         rows: results.csv with the index answer, variant, movements and seed.
         explored, asked: tables explored.csv and asked.csv, with the index variant and seed.
+        random: table random.csv.
+        changes: table changes.csv with the index robot, change, learner, movements and seed.
     """
 
     rows: pd.DataFrame
     explored: pd.DataFrame
     asked: pd.DataFrame
+    random: pd.DataFrame
+    changes: pd.DataFrame
 
     @classmethod
     def of(cls, folder: Path) -> Evidence:
@@ -61,7 +65,9 @@ class Evidence:
         key = ["answer", "variant", "movements", "seed"]
         rows = read_table(folder).set_index(key)[["error", "floor"]].sort_index()
         explored, asked = (read_table(folder, name).set_index("variant") for name in ("explored.csv", "asked.csv"))
-        return cls(rows, explored, asked)
+        after = ["robot", "change", "learner", "movements", "seed"]
+        changes = read_table(folder, "changes.csv").set_index(after).sort_index()
+        return cls(rows, explored, asked, read_table(folder, "random.csv"), changes)
 
     def at(self, name: str, movements: int = LAST, column: str = "error") -> pd.Series:
         """Errors (m) by seed after a number of movements; noise floors (m) if the column is "floor"."""

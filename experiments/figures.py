@@ -4,6 +4,11 @@
   paper       the paper's five learners, in its task space and in the larger one    (RESULTS)
   gain        error after each step from random movements to practice               (GAIN)
   curiosity   error with goals by interest, divided by the error with uniform goals (CURIOSITY)
+  shares      random robots on which each learner is best, and on which it harms     (ANY_ROBOT)
+  profile     random robots on which an error is within a factor of the smallest     (ANY_ROBOT)
+  kinds       error over that of random movements, by family and by noise            (ANY_ROBOT)
+  changes     error after a change, divided by the error of starting anew             (CHANGES)
+  simulator   error on a real arm, begun with a simulator or with nothing             (CHANGES)
 
 Points are interquartile means over seeds, with 95 % intervals. If a figure has no data, a message says so.
 
@@ -30,6 +35,7 @@ with loading():  # Ctrl-C shows no traceback
     from claimed import WHOLE
     from evidence import LAST, Evidence, NotRun
     from page_tables import GAIN
+    from robot_figures import FIGURES as OF_ROBOTS
     from sgimd_torch.figures.learning import COLOURS, NAMES
     from sgimd_torch.figures.save import save_figure
     from sgimd_torch.files import make_folder
@@ -83,7 +89,8 @@ def curiosity(found: Evidence) -> Figure:
 
 
 FIGURES: Final[dict[str, Callable[[Evidence], Figure]]] = {
-    figure.__name__: figure for figure in (learning, paper, gain, curiosity)
+    **{figure.__name__: figure for figure in (learning, paper, gain, curiosity)},
+    **OF_ROBOTS,
 }
 
 

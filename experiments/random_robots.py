@@ -1,50 +1,68 @@
-"""Robots made at random, on which no default was chosen: how well `practice` learns them, beside random movements.
+"""Robots made at random, on which no default was chosen: how well learners do on them, beside random movements.
 
-    experiments/random_robots.py --robots 0 36 --first 0 30 --out random.jsonl    # lives; made ones are kept
-    experiments/random_robots.py --first 0 30 --out random.jsonl --table          # the table of all lives made
+    experiments/random_robots.py                                        the lives of the page ANY_ROBOT
+    experiments/random_robots.py --robots 0 36 --results development    others, in a table of your own
 
 Nine families: planar and spatial chains, poses (which fill a thin part of their box), smooth and rugged maps, throws,
 maps that do nothing in half of Pi, contexts, periodic parameters. Units go from mm to km. Noise is absent, even,
 grows with the movement, or is one gross error in 33 movements.
 
 Numbers 0 to 199 are for development. Each error is the mean distance between goals and what the answers do without
-noise, divided by that of random movements, answered by the better of `process` and the nearest exemplar.
+noise. For the references the better of `process` and the nearest exemplar answers.
 """
 
 from __future__ import annotations
 
-import argparse
-import json
 import math
+import sys
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.algorithms.paper import random_exploration
+from lives import make_lives, parser
+from sgimd_torch.algorithms.paper import random_exploration, sagg_riac
 from sgimd_torch.algorithms.practice import practice
-from sgimd_torch.explore.returning import Returning
+from sgimd_torch.goals.interest_map import InterestMap
+from sgimd_torch.goals.uniform import UniformGoals
+from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.learner import Learner
 from sgimd_torch.parts import Inverse
+from sgimd_torch.runs.process import command
+from sgimd_torch.searches.perturb import Perturb
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Array, Box
 
 FAMILIES: Final = ("chain", "spatial", "pose", "smooth", "rugged", "throw", "idle", "context", "phases")
 NOISES: Final = ("none", "even", "speed", "gross")
 COUNTS: Final = (50, 100, 250, 500, 1000)  # movements at which a learner is evaluated
-HARMFUL: Final = 1.02  # errors above this many times those of random movements count as harm
-RANDOM: Final = "random"
+UNSEEN: Final = range(200, 260)  # robots of the page ANY_ROBOT, named before the first of them was run
+TABLE: Final = "random.csv"
+RANDOM, BASELINE = "random", "uniform-nearest"  # the references
+LEARNERS: Final[Mapping[str, Callable[[RandomRobot, int], Learner]]] = {
+    "practice": practice,
+    "practice-interest": partial(practice, goals=InterestMap),
+    "sagg-riac": sagg_riac,
+    BASELINE: partial(sagg_riac, goals=UniformGoals, inverse=NearestNeighbour, search=Perturb, budget=1),
+    RANDOM: random_exploration,
+}
+
+
+def kind(number: int) -> tuple[str, str, np.random.Generator]:
+    """Family and noise of the robot with this number, and the random stream that makes the rest of it."""
+    rng = np.random.default_rng([number, 2026])
+    return FAMILIES[number % len(FAMILIES)], NOISES[int(rng.integers(len(NOISES)))], rng
 
 
 class RandomRobot:
     """Robot with this ``number``; ``effect`` is the outcome without noise, ``goals`` are goals that it can reach."""
 
     def __init__(self, number: int) -> None:
-        rng = np.random.default_rng([number, 2026])
-        self.family, self.noise = FAMILIES[number % len(FAMILIES)], NOISES[int(rng.integers(len(NOISES)))]
+        self.family, self.noise, rng = kind(number)
         dim = int(rng.integers(3, 31))
         self._lengths, self._limits = rng.dirichlet(np.ones(dim) * 4), rng.uniform(0.4, 2.2, dim)
         self._axes = rng.normal(size=(dim, 3))
@@ -131,63 +149,36 @@ class RandomRobot:
         return float(np.mean(missed) / np.linalg.norm(self.goals - self.goals.mean(axis=0), axis=1).mean())
 
 
-def errors(robot: RandomRobot, learner: Learner, seed: int, also: Inverse | None = None) -> list[float]:
-    """Errors after each of `COUNTS` movements; the smaller one if ``also`` answers."""
-    found = []
-    for episode in run(learner, robot, seed, movements=COUNTS[-1]):
-        if episode.index + 1 in COUNTS:
-            found.append(min(robot.error(each) for each in (learner.inverse, also) if each is not None))
+def life(number: int, name: str) -> dict[int, tuple[float, int]]:
+    """Errors of the learner with this ``name`` on the robot with this ``number``, and the changes that it noticed."""
+    robot = RandomRobot(number)
+    learner = LEARNERS[name](robot, number)
+    references = [LocalProcess(learner.problem), NearestNeighbour(learner.problem)]
+    found = {}
+    for episode in run(learner, robot, number, movements=COUNTS[-1]):
+        if (movements := episode.index + 1) in COUNTS:
+            answers: list[Inverse] = references if name in (RANDOM, BASELINE) else [learner.inverse]
+            found[movements] = min(map(robot.error, answers)), len(learner.changes)
     return found
 
 
-def life(number: int, name: str) -> list[float]:
-    """Errors of a learner on the robot with this ``number``; ``name`` is "random" or a number of first movements."""
-    robot = RandomRobot(number)
-    if name == RANDOM:
-        learner = random_exploration(robot, number)
-        return errors(robot, learner, number, NearestNeighbour(learner.problem))
-    return errors(robot, practice(robot, number, explore=partial(Returning, first=int(name))), number)
+def make(
+    results: Path, processes: int, numbers: Iterable[int] = UNSEEN, learners: Collection[str] = tuple(LEARNERS)
+) -> None:
+    """Make the lives that the table in ``results`` lacks."""
+    lives = {(number, name): COUNTS[-1] for number in numbers for name in learners}
+    make_lives(results, TABLE, life, lives, processes)
 
 
-def table(lives: dict[tuple[int, str], list[float]], names: list[str]) -> str:
-    """Table in Markdown: harmful lives, worst life and geometric mean of each learner at each count."""
-    numbers = sorted(n for n, name in lives if name == RANDOM and all((n, each) in lives for each in names))
-    lines = [f"| {len(numbers)} robots | {' | '.join(map(str, COUNTS))} |", "|---" * (1 + len(COUNTS)) + "|"]
-    for name in names:
-        ratios = np.array([np.divide(lives[n, name], lives[n, RANDOM]) for n in numbers])
-        for what, row, form in (
-            (f"worse than {HARMFUL}", (ratios > HARMFUL).sum(axis=0), "d"),
-            ("worst", ratios.max(axis=0), ".1f"),
-            ("geometric mean", np.exp(np.log(ratios).mean(axis=0)), ".2f"),
-        ):
-            lines.append(f"| first {name}: {what} | {' | '.join(format(each, form) for each in row)} |")
-    return "\n".join(lines)
-
-
-def main() -> None:
-    """Make the missing lives, or print the table of the lives that were made."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    numbers = "first number of a robot, and the number after the last (default: 0 36)"
-    parser.add_argument("--robots", nargs=2, type=int, default=[0, 36], help=numbers)
-    parser.add_argument("--first", nargs="+", default=["0"], help="numbers of uniform first movements (default: 0)")
-    parser.add_argument("--out", type=Path, default=Path("random.jsonl"), help="file of all lives, a line each")
-    parser.add_argument("--table", action="store_true", help="print the table instead of making lives")
-    options = parser.parse_args()
-    rows: list[dict[str, Any]] = []
-    if options.out.exists():
-        rows = [json.loads(line) for line in options.out.read_text().splitlines()]
-    lives = {(row["robot"], row["learner"]): row["errors"] for row in rows}
-    if options.table:
-        print(table(lives, options.first))
-        return
-    for number in range(*options.robots):
-        for name in (RANDOM, *options.first):
-            if (number, name) not in lives:
-                row = {"robot": number, "learner": name, "errors": life(number, name)}
-                with options.out.open("a") as file:
-                    file.write(json.dumps(row) + "\n")
-                print(number, name, *(f"{each:.4f}" for each in row["errors"]), flush=True)
+def main(argv: Sequence[str] | None = None) -> int:
+    options = parser(__doc__)
+    numbers = "first number of a robot, and the number after the last (default: those of the page)"
+    options.add_argument("--robots", nargs=2, type=int, default=[UNSEEN.start, UNSEEN.stop], help=numbers)
+    options.add_argument("--learners", nargs="+", default=[*LEARNERS], choices=LEARNERS, help="learners (default: all)")
+    chosen = options.parse_args(argv)
+    make(chosen.results, chosen.processes, range(*chosen.robots), chosen.learners)
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(command(main))

@@ -35,10 +35,12 @@ TABLES: Final[dict[str, tuple[int, tuple[str, ...]]]] = {
     "explored.csv": (2, ("variant", "seed", "tiles", "goals", "near")),
     "asked.csv": (3, ("variant", "seed", "teacher", *_ASKED)),
     "rivals.csv": (4, ("rival", "setting", "seed", "movements", "linear", "process")),
+    "random.csv": (3, ("number", "learner", "movements", "error", "noticed")),
+    "changes.csv": (5, ("robot", "change", "learner", "seed", "movements", "error", "noticed")),
 }
 TYPES: Final = {  # types of columns; all other columns have floats, and an empty field is NaN
-    **dict.fromkeys(("variant", "task", "answer", "teacher", "rival", "setting"), "str"),
-    **dict.fromkeys(("seed", "movements", "tiles", *_ASKED), "int64"),
+    **dict.fromkeys(("number", "seed", "movements", "tiles", "noticed", *_ASKED), "int64"),
+    **dict.fromkeys(("variant", "task", "answer", "teacher", "rival", "setting", "learner", "robot", "change"), "str"),
     **dict.fromkeys(("goals", "near"), "Int64"),  # with empty fields
 }
 LATE: Final = 1000  # number of movements after which requests count as late: the learner should know whom to ask

@@ -7,6 +7,7 @@ is drawn from the tile of T that the learner has reached least.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Final
@@ -55,8 +56,8 @@ def least_explored(
         return np.where(outcomes == high, tiles - 1, np.floor((outcomes - low) / side))
 
     occupied, tile_of = np.unique(cells(demonstrated), axis=0, return_inverse=True)
-    reached = cells(memory.outcomes)
-    counts = np.array([(reached == tile).all(axis=1).sum() for tile in occupied])
+    reached = Counter(map(tuple, cells(memory.outcomes).tolist()))
+    counts = np.array([reached[tuple(tile)] for tile in occupied.tolist()])
     chosen = rng.choice(np.flatnonzero(counts == counts.min()))
     return demonstrations[int(rng.choice(np.flatnonzero(tile_of.ravel() == chosen)))]
 

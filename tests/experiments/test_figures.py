@@ -6,6 +6,7 @@ from matplotlib.colors import to_hex
 
 from evidence import Evidence, NotRun
 from figures import FIGURES, LEARNERS, main
+from made_lives import write_lives
 from made_up import MOVEMENTS, write_rows
 from page_tables import GAIN
 from sgimd_torch.figures.learning import COLOURS, NAMES
@@ -16,7 +17,7 @@ NOT_MADE_UP = ("middle", "middle-process")
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    return write_rows(tmp_path_factory.mktemp("results"))
+    return write_lives(write_rows(tmp_path_factory.mktemp("results")), robots=20, seeds=5)
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +84,7 @@ def test_interest_is_compared_with_uniform_goals_where_both_were_run(found):
 
 @pytest.mark.parametrize(("missing", "left_out"), [("sagg-riac-large", {"paper"}), ("practice-taught", {"learning"})])
 def test_only_those_figures_are_left_out_that_need_a_variant(tmp_path, capsys, missing, left_out):
-    folder = write_rows(tmp_path, without=[missing])
+    folder = write_lives(write_rows(tmp_path, without=[missing]), robots=10, seeds=2)
     for name in left_out:
         with pytest.raises(NotRun, match=missing):
             FIGURES[name](Evidence.of(folder))
@@ -104,3 +105,24 @@ def test_the_help_names_every_figure(capsys):
         main(["--help"])
     said = capsys.readouterr().out
     assert all(f"\n  {name} " in said for name in FIGURES)
+
+
+def test_the_shares_of_the_learners_that_are_best_add_up_to_one(found):
+    best, harmful = FIGURES["shares"](found).axes
+    assert {line.get_label() for line in best.lines} - {line.get_label() for line in harmful.lines} == {NAMES["random"]}
+    np.testing.assert_allclose(np.sum([line.get_ydata() for line in best.lines], axis=0), 1)
+
+
+def test_a_profile_begins_with_the_share_of_robots_on_which_a_learner_is_best_and_never_falls(found):
+    for ax in FIGURES["profile"](found).axes:
+        lines = {line.get_label(): line.get_ydata() for line in ax.lines}
+        assert lines[NAMES["practice"]][0] == 1
+        assert lines[NAMES["random"]][0] == 0
+        assert lines[NAMES["random"]][-1] == 1  # 1 / .3 of the best
+        assert all((np.diff(line) >= 0).all() for line in lines.values())
+
+
+def test_a_cell_has_the_error_after_a_change_over_that_of_starting_anew(found):
+    arm, rod, *_ = FIGURES["changes"](found).axes
+    assert [len({text.get_position()[0] for text in ax.texts}) for ax in (arm, rod)] == [4, 3]
+    assert {text.get_text() for text in arm.texts} == {"0.40"}

@@ -1,0 +1,157 @@
+"""Robots that nobody tuned on, and robots that change: statistics and claims from random.csv and changes.csv.
+
+    harmful(found, "practice", 250); judge(any_robot(found)); judge(changes(found))
+On random robots, the sample is the robots: each is learnt once by each learner.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import Final
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from changing import AFTER, ANEW, ARM, BEGUN, BLIND, GOES_ON, ROBOTS, SIMULATOR, WRONG, after
+from evidence import Evidence, Level, NotRun
+from judging import Claim, Part, at_most
+from page_tables import Page, markdown
+from random_robots import BASELINE, COUNTS, LEARNERS, RANDOM
+from sgimd_torch.figures.names import NAMES
+from sgimd_torch.views.statistics import LEVEL, Interval, interval, rng
+
+HARMFUL: Final = 1.02  # times the error of random movements; a larger error counts as harm
+MEANS: Final = dict(
+    zip(COUNTS, (0.75, 0.65, 0.40, 0.36, 0.32), strict=True)
+)  # bars of errors over those of random ones
+
+
+def errors(found: Evidence, at: int) -> pd.DataFrame:
+    """Errors after ``at`` movements: a row for each robot on which every learner has learnt, a column for each learner.
+
+    Raises:
+        NotRun: there are fewer than two such robots.
+    """
+    rows = found.random[found.random["movements"] == at]
+    table = rows.pivot(index="number", columns="learner", values="error").reindex(columns=[*LEARNERS]).dropna()
+    if len(table) < 2:
+        raise NotRun(f"random robots at {at}")
+    return table
+
+
+def share(which: pd.Series, *, level: Level = LEVEL) -> Interval:
+    """The share of robots for which ``which`` is true, with Wilson's interval."""
+    found = stats.binomtest(int(which.sum()), len(which)).proportion_ci(level or LEVEL, "wilson")
+    return Interval(float(which.mean()), found.low, found.high)
+
+
+def harmful(found: Evidence, name: str, at: int, *, level: Level = LEVEL) -> Interval:
+    """The share of robots on which a learner errs more than ``HARMFUL`` times as much as random movements."""
+    table = errors(found, at)
+    return share(table[name] > HARMFUL * table[RANDOM], level=level)
+
+
+def best(found: Evidence, name: str, at: int, *, level: Level = LEVEL) -> Interval:
+    """The share of robots on which a learner has the smallest error."""
+    return share(errors(found, at).idxmin(axis=1) == name, level=level)
+
+
+def over(found: Evidence, ours: str, theirs: str, at: int, *, level: Level = LEVEL) -> Interval:
+    """The geometric mean over robots of our error divided by theirs."""
+    table = errors(found, at)
+    ratios = np.log(table[ours] / table[theirs]).to_numpy()
+    return interval(lambda drawn: np.exp(drawn.mean(axis=-1)), ratios, rng=rng(), level=level or LEVEL)
+
+
+def any_robot(found: Evidence) -> list[Claim]:
+    """Claims about `practice` on random robots."""
+
+    def less(theirs: str) -> list[Part]:
+        return [at_most(1, over, found, "practice", theirs, at, name=f"at {at}") for at in COUNTS]
+
+    seldom = [at_most(0.05, harmful, found, "practice", at, margin=0.1, name=f"at {at}") for at in COUNTS]
+    means = [at_most(bar, over, found, "practice", RANDOM, at, name=f"at {at}") for at, bar in MEANS.items()]
+    listed = ", ".join(f"{bar:.2f}" for bar in MEANS.values())
+    return [
+        Claim(
+            "`practice` harms on at most 0.05 of the robots at each number of movements, interval up to 0.15", seldom
+        ),
+        Claim(f"... errs in the mean at most {listed} times as much as random movements", means),
+        Claim("... less than SAGG-RIAC at each: ratio ≤ 1", less("sagg-riac")),
+        Claim("... than the standard baseline", less(BASELINE)),
+        Claim("... than with goals by interest", less("practice-interest")),
+    ]
+
+
+def table(page: Page) -> str:
+    """The geometric mean of each learner's errors over those of random movements, and the largest ratio."""
+    rows = []
+    try:
+        for name in LEARNERS:
+            ratios = [each[name] / each[RANDOM] for each in (errors(page.found, at) for at in COUNTS)]
+            rows.append([NAMES[name], *(f"{np.exp(np.log(each).mean()):.2f}, {each.max():.1f}" for each in ratios)])
+    except NotRun as missing:
+        page.missing.append(str(missing))
+    return markdown(("mean, worst", *map(str, COUNTS)), rows[:-1])
+
+
+def alarms(page: Page) -> str:
+    """How many lives on random robots, which do not change, noticed a change: ``2 of 240``."""
+    rows = page.found.random
+    last = rows[(rows["movements"] == COUNTS[-1]) & (rows["learner"].isin([*LEARNERS][:3]))]
+    return f"{(last['noticed'] > 0).sum()} of {len(last)}"
+
+
+def after_change(found: Evidence, robot: str, change: str, learner: str, at: int) -> pd.Series:
+    """Errors by seed, ``at`` movements after a change.
+
+    Raises:
+        NotRun: fewer than two seeds were run.
+    """
+    place = (robot, change, learner, at)
+    if place not in found.changes.index or len(errors := found.changes.loc[place, "error"]) < 2:
+        raise NotRun(f"{learner} after {change} of {robot} at {at}")
+    return errors
+
+
+def over_anew(
+    found: Evidence,
+    robot: str,
+    change: str,
+    at: int,
+    learner: str = GOES_ON,
+    other: str = ANEW,
+    *,
+    level: Level = LEVEL,
+) -> Interval:
+    """The error after a change divided by that of a learner that starts anew, or of an ``other`` one."""
+    return found.over(*(after_change(found, robot, change, each, at) for each in (learner, other)), level=level)
+
+
+def changes(found: Evidence) -> list[Claim]:
+    """Claims about `practice` on robots that change, and about beginning with a simulator."""
+
+    def parts(bar: float, *names: str, times: tuple[int, ...] = AFTER, other: str = ANEW) -> list[Part]:
+        return [
+            at_most(bar, over_anew, found, robot, change, at, GOES_ON, other, name=f"{change}, {robot}, {at}")
+            for robot, change in product(ROBOTS, names)
+            for at in {*times} & {*after(robot)}
+        ]
+
+    def begun(bar: float, learner: str, *times: int) -> list[Part]:
+        return [at_most(bar, over_anew, found, ARM, SIMULATOR, at, learner, name=f"at {at}") for at in times]
+
+    shifts = ("offset-0.1", "offset-0.02", "gain")
+    return [
+        Claim("Offset, gain, undone: half the error of starting anew at 100, 250: ratios ≤ 0.50",
+              parts(0.5, *shifts, "undone", times=(100, 250))),
+        Claim("Never worse than anew at 100 to 1000: ratios ≤ 1.05: offset, gain, gradual",
+              parts(1.05, *shifts, "gradual")),
+        *(Claim(f"... {change}", parts(1.05, change)) for change in ("stuck", "undone", "mirrored")),
+        Claim("Noise: nor than a learner that notices nothing: ratios ≤ 1.05",
+              parts(1.05, "noise", other=BLIND)),
+        Claim("Simulator: half the error at 50, 100: ratios ≤ 0.50", begun(0.5, GOES_ON, *BEGUN[:2])),
+        Claim("... never worse: ratios ≤ 1.03", begun(1.03, GOES_ON, *BEGUN)),
+        Claim("... nor with a wrong, mirrored one", begun(1.03, WRONG, *BEGUN)),
+    ]  # fmt: skip

@@ -1,0 +1,127 @@
+"""Robots that nobody tuned on, and robots that change: how they change, their statistics, their claims."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import robots
+from changing import ARM, GRADUAL, SIMULATOR, UNDONE, Changing, errors
+from evidence import Evidence, NotRun
+from judging import judge
+from made_lives import write_lives
+from random_robots import FAMILIES, LEARNERS, RandomRobot, kind
+from sgimd_torch.algorithms.practice import practice
+from sgimd_torch.environments.planar_arm import PlanarArm
+
+CLAIMS = {"any_robot": robots.any_robot, "changes": robots.changes}
+
+
+def moved(change, since, theta):
+    """Movement that an arm executes where it is told ``theta``, some movements after the change."""
+    world, seen = Changing(PlanarArm(), change, at=10), []
+    world.robot.execute = lambda context, theta, rng: seen.append(theta) or np.ones(2)
+    world.made = 10 + since
+    outcome = world.execute(np.empty(0), theta, np.random.default_rng(0))
+    return seen[0], outcome
+
+
+@pytest.mark.parametrize(
+    ("change", "since", "shift"),
+    [
+        ("offset-0.02", -1, 0),
+        ("offset-0.02", 0, 0.02),
+        ("gradual", GRADUAL // 2, 0.05),
+        ("undone", UNDONE - 1, 0.1),
+        ("undone", UNDONE, 0),
+    ],
+)
+def test_an_offset_shifts_every_parameter_from_its_movement_on(change, since, shift):
+    box = PlanarArm().policies
+    theta = box.low + 0.4 * box.sides
+    np.testing.assert_allclose((moved(change, since, theta)[0] - theta) / box.sides, shift, atol=1e-12)
+
+
+def test_a_mirrored_robot_turns_movements_and_the_first_outcome_around():
+    box = PlanarArm().policies
+    theta, outcome = moved("mirrored", 0, box.low + 0.4 * box.sides)
+    np.testing.assert_allclose(theta, box.low + 0.6 * box.sides)
+    np.testing.assert_array_equal(outcome, [-1, 1])
+
+
+def test_a_life_is_evaluated_after_the_change_and_counts_movements_from_it():
+    arm, executed = Changing(PlanarArm(), "offset-0.1", at=3), []
+    arm.execute = lambda context, theta, rng: executed.append(arm.made) or np.zeros(2)
+    found = errors(practice(arm, 0), arm, 0, np.array([[0.5, 0.0]]), 3, (1, 4))
+    assert {at: error for at, (error, _) in found.items()} == {1: 0.5, 4: 0.5}
+    assert executed == [0, 1, 2, 3, 4, 4, 5, 6, 7]  # the fifth and the last belong to evaluations
+
+
+@pytest.mark.parametrize("number", [0, 7])
+def test_the_kind_of_a_random_robot_is_known_without_making_it(number):
+    robot = RandomRobot(number)
+    assert (robot.family, robot.noise) == kind(number)[:2]
+    assert robot.family == FAMILIES[number]
+
+
+def found_in(folder, spoilt=lambda *key: 1.0, **how):
+    return Evidence.of(write_lives(folder, spoilt, **how))
+
+
+def test_shares_and_means_over_robots(tmp_path):
+    """SAGG-RIAC errs .8, on one robot of four .2 and on another one 1.6; random movements 1, `practice` .3."""
+    found = found_in(tmp_path, lambda *key: {(0, "sagg-riac"): 0.25, (1, "sagg-riac"): 2.0}.get(key[:2], 1.0), robots=4)
+    assert robots.best(found, "sagg-riac", 50).value == 0.25
+    assert robots.best(found, "practice", 50).value == 0.75
+    assert robots.harmful(found, "sagg-riac", 50).value == 0.25
+    assert robots.over(found, "sagg-riac", "random", 50).value == pytest.approx((0.8**4 * 0.25 * 2) ** (1 / 4))
+
+
+def test_no_harm_on_sixty_robots_does_not_exclude_harm_on_one_in_twenty(tmp_path):
+    """Wilson's bound for 0 of n is z^2 / (n + z^2)."""
+    value, low, high = robots.harmful(found_in(tmp_path), "practice", 100)
+    assert (value, low, high) == pytest.approx((0, 0, 1.96**2 / (60 + 1.96**2)), abs=1e-5)
+
+
+def test_only_robots_that_every_learner_has_learnt_count(tmp_path):
+    found = found_in(tmp_path, robots=5)
+    found = replace(found, random=found.random.query("number != 3 or learner != 'random'"))
+    assert [*robots.errors(found, 50).index] == [0, 1, 2, 4]
+    assert {*robots.errors(found, 50).columns} == {*LEARNERS}
+
+
+def test_the_learner_of_before_is_compared_with_the_one_that_starts_anew(tmp_path):
+    found = found_in(tmp_path)
+    assert robots.over_anew(found, "toss", "gain", 250, level=None).value == pytest.approx(0.4)
+    with pytest.raises(NotRun, match="goes-on after gain of fishing-rod at 1000"):
+        robots.over_anew(found, "fishing-rod", "gain", 1000)
+
+
+@pytest.mark.parametrize("page", CLAIMS)
+def test_where_every_bar_is_cleared_every_claim_holds(tmp_path, page):
+    verdicts = judge(CLAIMS[page](found_in(tmp_path)))
+    assert {each.claim: each.verdict for each in verdicts if each.verdict != "holds"} == {}
+
+
+@pytest.mark.parametrize(
+    ("page", "claim", "spoilt"),
+    [
+        ("any_robot", 0, lambda number, *key: 4 if key == ("practice", 100) and number < 15 else 1),
+        ("any_robot", 1, lambda number, *key: 1.2 if key == ("practice", 1000) else 1),
+        ("any_robot", 2, lambda number, *key: 0.3 if key == ("sagg-riac", 50) else 1),
+        ("any_robot", 3, lambda number, *key: 0.3 if key == ("uniform-nearest", 50) else 1),
+        ("any_robot", 4, lambda number, *key: 0.3 if key == ("practice-interest", 50) else 1),
+        ("changes", 0, lambda *key: 1.5 if key == ("fishing-rod", "undone", "goes-on", 250) else 1),
+        ("changes", 1, lambda *key: 3 if key == ("toss", "gradual", "goes-on", 500) else 1),
+        ("changes", 2, lambda *key: 3 if key == ("crawler", "stuck", "goes-on", 1000) else 1),
+        ("changes", 3, lambda *key: 3 if key == ("crawler", "undone", "goes-on", 1000) else 1),
+        ("changes", 4, lambda *key: 3 if key == ("planar-arm-7", "mirrored", "goes-on", 100) else 1),
+        ("changes", 5, lambda *key: 0.3 if key == ("toss", "noise", "blind", 100) else 1),
+        ("changes", 6, lambda *key: 1.5 if key == (ARM, SIMULATOR, "goes-on", 50) else 1),
+        ("changes", 7, lambda *key: 3 if key == (ARM, SIMULATOR, "goes-on", 1000) else 1),
+        ("changes", 8, lambda *key: 3 if key == (ARM, SIMULATOR, "wrong", 1000) else 1),
+    ],
+)
+def test_a_claim_that_the_rows_contradict_fails(tmp_path, page, claim, spoilt):
+    (verdict,) = judge([CLAIMS[page](found_in(tmp_path, spoilt))[claim]])
+    assert verdict.verdict == "fails", verdict

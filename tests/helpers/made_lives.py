@@ -1,0 +1,35 @@
+"""Lives for processes of their own, which import this module, and made-up rows of random.csv and changes.csv."""
+
+import numpy as np
+
+from table import TABLES, merge
+
+ALIVE = {(k, name): 2 for k in range(2) for name in ("practice", "random")}  # movements by key
+
+
+def life(number, learner):
+    return {1: (0.5, 0), 2: (0.25 + number, number)}
+
+
+def write_lives(folder, factor=lambda *key: 1.0, robots=60, seeds=8):
+    """Tables in which every claim is true; ``factor`` (columns of the key) -> factor of an error."""
+    from changing import AFTER, ARM, BEGUN, CHANGES, ROBOTS, SIMULATOR, after, learners
+    from random_robots import COUNTS, LEARNERS, RANDOM
+
+    rows = []
+    for number in range(robots):
+        for name in LEARNERS:
+            for at in COUNTS:
+                error = {"practice": 0.3, RANDOM: 1.0}.get(name, 0.8) * (1 + 0.002 * number)
+                rows.append((number, name, at, error * factor(number, name, at), 0))
+    merge(folder, "random.csv", [dict(zip(TABLES["random.csv"][1], row, strict=True)) for row in rows])
+    rows, goes_on = [], {**dict.fromkeys(AFTER, 0.4), 50: 0.4}
+    places = [(robot, change, after(robot)) for robot in ROBOTS for change in CHANGES]
+    for robot, change, times in [*places, (ARM, SIMULATOR, BEGUN)]:
+        for learner in learners(change):
+            for at in times:
+                for seed in range(seeds):
+                    error = {"goes-on": goes_on[at], "wrong": 0.9}.get(learner, 1.0) * np.exp(0.01 * (seed % 3))
+                    rows.append((robot, change, learner, seed, at, error * factor(robot, change, learner, at), 0))
+    merge(folder, "changes.csv", [dict(zip(TABLES["changes.csv"][1], row, strict=True)) for row in rows])
+    return folder
