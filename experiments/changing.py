@@ -76,6 +76,8 @@ class Changing:
                 theta = middle + 0.8 * (theta - middle)
             case "stuck":
                 theta[1] = box.low[1] + 0.7 * box.sides[1]
+            case "reversed":  # only tests use it: nothing of before helps
+                theta = box.low + (theta[::-1] - box.low[::-1]) * (box.sides / box.sides[::-1])
             case "mirrored":
                 theta = 2 * middle - theta
         outcome = self.robot.execute(context, box.clip(theta), rng)
