@@ -8,7 +8,6 @@ their order, so a replay notices the same.
 
 from __future__ import annotations
 
-import itertools
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -16,7 +15,7 @@ import numpy as np
 from sgimd_torch.changes.calibration import Calibration, by_halves
 from sgimd_torch.changes.regimes import NEAR, Exemplars, Regime, predicted, squared
 from sgimd_torch.inverses.gaussian_process import one_thread
-from sgimd_torch.inverses.local_process import Learnt, LocalProcess
+from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.memory import Memory, Rows
 from sgimd_torch.parts import Problem
 from sgimd_torch.spaces import Array
@@ -47,17 +46,6 @@ class Again(NamedTuple):
     new: bool
 
 
-class _Told(NamedTuple):
-    """A movement to be compared: what it is predicted from, see `predicted`, its outcome, and numbers of exemplars."""
-
-    learnt: Learnt
-    near: Rows
-    here: Array
-    outcome: Array
-    known: int
-    n: int
-
-
 class Notice:
     """Watches the exemplars of a learner.
 
@@ -75,7 +63,6 @@ class Notice:
         self.since = self._compared = 0
         self._regimes: list[Regime] = []  # earlier ones, the one that was used last comes last
         self._review = 0  # length of the regime at which to look back again, 0: never
-        self._told: list[_Told] = []
         self._calm()
         if prior is not None:
             self._review = _FIRST_LOOK
@@ -88,23 +75,23 @@ class Notice:
         self._cusum, self._start, self._quiet, self._looks = 0.0, -1, 0, 0
 
     def expect(self, process: LocalProcess, context: Array, theta: Array, outcome: Array) -> None:
-        """Take down a movement that is not in memory yet, and what predicts it; `look` compares many at once."""
+        """Predict a movement that is not in memory yet, and compare."""
         learnt = process.learnt()
         if learnt is None:
             return
         here = ((np.concatenate((theta, context)) - learnt.units[0]) / learnt.units[1])[None]
-        near, sizes = learnt.inputs.nearest(here, NEAR), (len(process.memory), len(self.life) + 1)
-        self._told.append(_Told(learnt, near, here, outcome, *sizes))
+        near = learnt.inputs.nearest(here, NEAR)
+        found, (variance,), _ = predicted(learnt.inputs, process.memory.outcomes, near, here, learnt.kernel)
+        self._errors.append(float(squared(found[0] - outcome)))
+        surprise = self._errors[-1] / (len(outcome) * float(variance) + 1e-300)
+        self._surprises = [*self._surprises[-_RECENT:], surprise]
+        if len(process.memory) >= _FIRST and len(self._surprises) >= _CALM:
+            self._accumulate(len(self.life) + 1)
 
     def look(self, process: LocalProcess) -> Again | None:
         """What to begin again with; None to go on."""
-        n, review = len(self.life), self._review and len(self.life) - self.since >= self._review
-        # A suspicion is tested after the first of `_LOOKS` at the earliest, and until then cannot be given up either.
-        may_wait = self._start < 0 and max(len(self._told), n - self._quiet) < _LOOKS[0]
-        if may_wait and n - self._compared < _EVERY and not review:
-            return None
-        self._compare(process)
-        if self._start < 0 and review:
+        n = len(self.life)
+        if self._start < 0 and self._review and n - self.since >= self._review:
             return self._look_back(new=False)
         m = self._suspected(process, n)
         if m and (m := self._changed(process, m)):
@@ -113,21 +100,6 @@ class Notice:
             self._regimes, self.since = [*self._regimes, Regime(learnt, before)][-_REGIMES:], n - m
             return self._look_back(new=True)
         return None
-
-    def _compare(self, process: LocalProcess) -> None:
-        """Predict the movements that were told since the last call, each from the exemplars before it."""
-        told, self._told = self._told, []
-        for _, group in itertools.groupby(told, lambda each: (id(each.learnt.inputs), each.near.shape)):
-            some = list(group)
-            tables = zip(*((each.near, each.here, each.outcome[None]) for each in some), strict=True)
-            learnt, (near, here, outcomes) = some[0].learnt, map(np.concatenate, tables)
-            found, variances, _ = predicted(learnt.inputs, process.memory.outcomes, near, here, learnt.kernel)
-            for each, error, variance in zip(some, squared(found - outcomes), variances, strict=True):
-                self._errors.append(float(error))
-                surprise = self._errors[-1] / (len(each.outcome) * float(variance) + 1e-300)
-                self._surprises = [*self._surprises[-_RECENT:], surprise]
-                if each.known >= _FIRST and len(self._surprises) >= _CALM:
-                    self._accumulate(each.n)
 
     def _accumulate(self, n: int) -> None:
         """Add the last surprise to the CUSUM; ``n``: number of exemplars with this one."""

@@ -87,18 +87,6 @@ def test_after_a_small_change_a_learner_is_far_better_than_one_that_begins_and_o
     assert error(learner, robot) < 0.6 * min(error(anew, robot), error(deaf, robot))
 
 
-def test_movements_compared_many_at_once_show_a_change_as_those_compared_one_by_one(changed):
-    learner, _ = changed
-    robot = Changing(PlanarArm(7), "offset-0.05", 400)
-    one_by_one = practice(robot, 3)
-    for episode in run(one_by_one, robot, 0, movements=450):
-        robot.made = episode.index + 1
-        if one_by_one.watcher._notice is not None:
-            one_by_one.watcher._notice._compare(one_by_one.inverse.of_all)
-    assert one_by_one.changes == learner.changes
-    assert np.array_equal(one_by_one.memory.thetas, learner.memory.thetas[:450])
-
-
 def test_if_nothing_holds_any_more_nothing_is_kept():
     robot = Changing(ARM, "reversed", 200)
     learner = practice(robot, 3)
