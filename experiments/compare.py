@@ -24,6 +24,8 @@ with loading():  # Ctrl-C shows no traceback
     import numpy as np
     import pandas as pd
 
+    import changing
+    import random_robots
     from sgimd_torch.catalogue import unknown
     from sgimd_torch.files import make_folder
     from sgimd_torch.record import RunError
@@ -39,7 +41,7 @@ EXAMPLES: Final = f"""experiments: {", ".join(EXPERIMENTS)}
 examples:
   python experiments/compare.py --dry-run                         list the runs that the pages still lack
   python experiments/compare.py                                   make the runs that the pages still lack
-  python experiments/compare.py --results mine                    all rows again, into mine/
+  python experiments/compare.py --all --results mine              all rows of all pages again, into mine/
   python experiments/compare.py paper large --seeds 0-2 --results mine
   python experiments/compare.py rivals --only sgim-d-once cma-me --results mine      two variants, rows in mine/
   python experiments/compare.py --shard 3/20                      a part of the runs, see docs/clusters.md
@@ -72,11 +74,14 @@ def main(argv: Sequence[str] | None = None) -> int:
         say("nothing is left to run: --verify 10 makes ten of these rows again, --results FOLDER makes all again")
     if options.dry_run:
         print("".join(f"{config.title}\n" for config in left), end="")
-    if options.dry_run or not left:
+    if options.dry_run:
         return 0
     make_folder(options.results)
     failures = _run(left, options, lambda config: collect(config, options.results))
     say(f"{len(left) - len(failures)} runs ended well, {len(failures)} failed: {where}", *failures)
+    if options.all:
+        random_robots.make(options.results, options.processes)
+        changing.make(options.results, options.processes)
     return 1 if failures else 0
 
 
@@ -194,6 +199,7 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
         "--only", nargs="+", default=[], metavar="VARIANT", help="variants to run (default: all of them)"
     )
     add_options(parser, seeds=None, default="seeds of the page of each experiment")
+    parser.add_argument("--all", action="store_true", help="also the lives of random robots and of robots that change")
     parser.add_argument("--out", type=Path, default=Path("runs"), help="folder of the runs (default: %(default)s)")
     parser.add_argument("--results", type=Path, default=Path("results"), help=results)
     parser.add_argument(

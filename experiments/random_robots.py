@@ -26,6 +26,7 @@ from numpy.typing import ArrayLike
 from lives import make_lives, parser
 from sgimd_torch.algorithms.paper import random_exploration, sagg_riac
 from sgimd_torch.algorithms.practice import practice
+from sgimd_torch.explore.returning import Returning
 from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.goals.uniform import UniformGoals
 from sgimd_torch.inverses.local_process import LocalProcess
@@ -45,6 +46,7 @@ TABLE: Final = "random.csv"
 RANDOM, BASELINE = "random", "uniform-nearest"  # the references
 LEARNERS: Final[Mapping[str, Callable[[RandomRobot, int], Learner]]] = {
     "practice": practice,
+    "practice-middle": partial(practice, explore=partial(Returning, first=0)),
     "practice-interest": partial(practice, goals=InterestMap),
     "sagg-riac": sagg_riac,
     BASELINE: partial(sagg_riac, goals=UniformGoals, inverse=NearestNeighbour, search=Perturb, budget=1),

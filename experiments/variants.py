@@ -55,6 +55,7 @@ SCHOOL: Final = ("map-elites", "cma-mae")  # algorithms of quality diversity; th
 CORNER, MANY = MADE = (Path("corner.npz"), Path("many.npz"))  # files of demonstrations that ``make_subsets`` writes
 ONCE: Final[Variant] = {"teacher": "initial", "teacher.every": 1}  # at the start, one demonstration a movement
 PRACTICE: Final[Variant] = {"algorithm": "practice"}
+MIDDLE_FIRST: Final[Variant] = {**PRACTICE, "explore.first": 0}  # begun around the middle of Pi, not anywhere
 TAUGHT: Final[Variant] = {"algorithm": "practice-taught", **ONCE}
 UNTAUGHT: Final[dict[str, Variant]] = {
     "random": {"algorithm": "random"},
@@ -174,6 +175,7 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
             name: {**line, **WHOLE}
             for name, line in {
                 "practice": PRACTICE,
+                "practice-middle": MIDDLE_FIRST,
                 "practice-uniform": {**PRACTICE, "goals": "uniform"},
                 "practice-interest": {**PRACTICE, "goals": "interest-map"},
                 "practice-taught-every-30": {
@@ -186,7 +188,7 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
             }.items()
         },
         "practice-taught": {**TAUGHT, **WHOLE, **FLOOR},
-        **_on_tasks({"practice": PRACTICE}, TASKS),
+        **_on_tasks({"practice": PRACTICE, "practice-middle": MIDDLE_FIRST}, TASKS),
     },
     "asking": {
         **{

@@ -50,7 +50,7 @@ PRACTICE = {
     "budget": 1,
     "global_range": (0.02, 0.3),
     "explore": "returning",
-    "explore.first": 0,
+    "explore.first": 30,
     "goals": "within-reach",
     "inverse": "among-effects",
     "search": "vary",

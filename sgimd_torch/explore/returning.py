@@ -23,22 +23,23 @@ _NEAREST: Final = 10  # number of movements with an effect, in the most similar 
 
 
 class Returning(Explore):
-    """Gaussian movements around the middle of Pi; if effects are rare, variations of movements that had an effect.
+    """First uniform movements, then Gaussian ones; if effects are rare, variations of movements that had an effect.
 
-    While every movement has an effect, exploration is that of `Widening`. Otherwise movements are uniform in Pi until
-    one has an effect; then half of them are variations of a movement that had an effect in a similar context.
+    After the first movements, while every movement has an effect, exploration is that of `Widening`. Otherwise
+    movements are uniform in Pi until one has an effect; then half of them are variations of a movement that had an
+    effect in a similar context.
 
     Args:
         problem: problem to learn. If its inverse model reports no ``effects``, exploration is always that of
             `Widening`.
-        first: number of movements at the start that are uniform in Pi. Thirty help on most robots, but twice the
-            error remains where movements around the middle of Pi soon reach all of T, as with the rod.
+        first: number of movements at the start that are uniform in Pi. Thirty suit most robots. 0 suits those on which
+            movements around the middle of Pi soon reach all of T, as on the rod.
 
     Raises:
         ValueError: ``first`` is no count.
     """
 
-    def __init__(self, problem: Problem, *, first: int = 0) -> None:
+    def __init__(self, problem: Problem, *, first: int = 30) -> None:
         super().__init__(problem)
         self.first = check_count("first", first, 0)
         self.width, self._widening = problem.shared(Width, Width), Widening(problem)
