@@ -74,11 +74,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         say("nothing is left to run: --verify 10 makes ten of these rows again, --results FOLDER makes all again")
     if options.dry_run:
         print("".join(f"{config.title}\n" for config in left), end="")
-    if options.dry_run:
         return 0
     make_folder(options.results)
-    failures = _run(left, options, lambda config: collect(config, options.results))
-    say(f"{len(left) - len(failures)} runs ended well, {len(failures)} failed: {where}", *failures)
+    failures = []
+    if left:
+        failures = _run(left, options, lambda config: collect(config, options.results))
+        say(f"{len(left) - len(failures)} runs ended well, {len(failures)} failed: {where}", *failures)
     if options.all:
         random_robots.make(options.results, options.processes)
         changing.make(options.results, options.processes)
