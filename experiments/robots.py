@@ -120,6 +120,12 @@ def after_change(found: Evidence, robot: str, change: str, learner: str, at: int
     return errors
 
 
+def seeds(found: Evidence) -> str:
+    """The seeds of the lives on robots that change: ``240 to 245``."""
+    made = found.changes.index.get_level_values("seed")
+    return f"{made.min()} to {made.max()}"
+
+
 def over_anew(
     found: Evidence,
     robot: str,
