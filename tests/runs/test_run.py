@@ -85,8 +85,8 @@ def test_every_choice_runs_and_differs_from_the_others(tmp_path, go, kind, table
     for choice in choices:
         assert go(tmp_path, "--name", choice, f"--{option}", choice, *common) == 0
         logs.add(tuple(content_of(tmp_path / choice / "seed-003")["events"]))
-    # On an arm, whose T is right, where every movement has an effect, these are `uniform`, `widening` and `process`.
-    assert len(logs) == len(choices) - len({"within-reach", "returning", "among-effects"}.intersection(choices))
+    # On an arm, whose T is right, where every movement has an effect, these are `uniform` and `process`.
+    assert len(logs) == len(choices) - len({"within-reach", "among-effects"}.intersection(choices))
 
 
 @pytest.mark.parametrize("slip", ["three samples", "degrees", "milliseconds", "a few milliseconds"])
