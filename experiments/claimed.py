@@ -229,10 +229,8 @@ def asking(found: Evidence) -> list[Claim]:
     def at_equal_cost(*, level: Level = LEVEL) -> Interval:
         """Our error minus that of SGIM-D at equal cost; errors of SGIM-D are interpolated between its evaluations."""
         ours, shown = shared(found.at(dear), asked(dear, "shown"))
-        costs = (LAST + COST * shown) / (1 + COST / EVERY)
-        curve = found.curve(sgim_d)
-        both = costs.index.intersection(curve.index)
-        theirs = pd.Series({seed: np.interp(costs[seed], curve.columns, curve.loc[seed]) for seed in both})
+        costs, curve = shared((LAST + COST * shown) / (1 + COST / EVERY), found.curve(sgim_d))
+        theirs = pd.Series({seed: np.interp(costs[seed], curve.columns, curve.loc[seed]) for seed in costs.index})
         return found.less(ours, theirs, level=level)
 
     return [

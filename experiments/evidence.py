@@ -220,7 +220,7 @@ def shared(ours: pd.Series, theirs: pd.Series) -> tuple[pd.Series, pd.Series]:
     seeds = ours.index.intersection(theirs.index)
     if len(seeds) < 2:
         raise NotRun("fewer than two seeds in common")
-    return ours[seeds], theirs[seeds]
+    return ours.loc[seeds], theirs.loc[seeds]
 
 
 def movements_to_reach(movements: Array, errors: Array, level: Array | float) -> Array:
