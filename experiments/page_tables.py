@@ -147,7 +147,7 @@ class Page:
 
     def suite(self, at: int = 1000) -> str:
         """Errors divided by the error of random movements: on each task, and as interquartile mean over tasks."""
-        learners = ("practice", UNIFORM, "map-elites")
+        learners = ("practice", "practice-middle", UNIFORM, "map-elites")
         known = {name: [task for task in TASKS if on(name, task) in VARIANTS] for name in learners}
         rows = [
             [titled(task), *(self._over_tasks(name, [task], at) if task in known[name] else "–" for name in learners)]
