@@ -93,12 +93,12 @@ def _of_teacher(teacher: int, ending: str = "") -> dict[str, Variant]:
 
 
 def _on_tasks(learners: dict[str, Variant], tasks: Iterable[str]) -> dict[str, Variant]:
-    """Each learner on each task except the rod, and except the toss if the learner takes no context."""
+    """Each learner on each task except the rod; quality diversity also without contexts and rare effects."""
     return {
         f"{name}.{task}": {**line, **TASKS[task].options, **SHORT}
         for task in tasks
         for name, line in learners.items()
-        if task != ROD and not (name in SCHOOL and task == "toss")
+        if task != ROD and not (name in SCHOOL and task in ("toss", *SPARSE))
     }
 
 
