@@ -50,7 +50,8 @@ def learning(found: Evidence) -> Figure:
     """Error against movements on the rod."""
     figure = Figure(figsize=(8, 4.4), layout="constrained")
     ax = figure.subplots()
-    curves(ax, found, {name: name for name in ("random", "sagg-riac", "sgim-d", "practice", "practice-taught")})
+    shown = ("random", "sagg-riac", "sgim-d", "practice", "practice-middle", "practice-taught")
+    curves(ax, found, {name: name for name in shown})
     return figure
 
 

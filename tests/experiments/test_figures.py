@@ -52,7 +52,7 @@ def test_a_curve_is_the_mean_over_seeds_in_the_colour_of_its_algorithm_with_its_
     means = [found.error("practice", at, level=None).value for at in MOVEMENTS]
     np.testing.assert_allclose(line.get_ydata(), means)
     heights = sorted(text.get_position()[1] for text in ax.texts)
-    assert len(heights) == len(lines) == 5
+    assert len(heights) == len(lines) == 6
     assert np.diff(heights).min() > 0.05 * ax.get_ylim()[1]  # no two names overlap
 
 
