@@ -212,7 +212,7 @@ VARIANTS: Final = {name: line for variants in EXPERIMENTS.values() for name, lin
 # Seeds of each experiment. They were first used after the defaults had been frozen.
 SEEDS: Final = {
     **dict.fromkeys(EXPERIMENTS, range(240, 250)),
-    **dict.fromkeys(("paper", "letter", "rivals", "practice", "suite"), range(240, 260)),
+    **dict.fromkeys(("paper", "letter"), range(240, 260)),
 }
 # The second table, beside results.csv, that gets rows from the runs of an experiment.
 SMALL_TABLES: Final = {"asking": "asked.csv", **dict.fromkeys(("paper", "letter", "large"), "explored.csv")}
