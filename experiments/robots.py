@@ -16,7 +16,7 @@ from scipy import stats
 from changing import AFTER, ANEW, ARM, BEGUN, BLIND, GOES_ON, ROBOTS, SIMULATOR, WRONG, after
 from evidence import Evidence, Level, NotRun
 from judging import Claim, Part, at_most
-from page_tables import Page, markdown
+from page_tables import MISSING_CELL, Page, markdown
 from random_robots import BASELINE, COUNTS, LEARNERS, RANDOM
 from sgimd_torch.figures.names import NAMES
 from sgimd_torch.views.statistics import LEVEL, Interval, interval, point, rng
@@ -123,7 +123,7 @@ def after_change(found: Evidence, robot: str, change: str, learner: str, at: int
 def seeds(found: Evidence) -> str:
     """The seeds of the lives on robots that change: ``240 to 245``."""
     made = found.changes.index.get_level_values("seed")
-    return f"{made.min()} to {made.max()}"
+    return f"{made.min()} to {made.max()}" if len(made) else MISSING_CELL
 
 
 def over_anew(
