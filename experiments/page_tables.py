@@ -77,9 +77,9 @@ class Page:
         """The error (m), with its interval if ``between``."""
         return self.cell(self.found.error, name, at, form=form, between=between)
 
-    def errors(self, name: str, times: Sequence[int], form: str = ".3f", *, between: bool = False) -> list[str]:
+    def errors(self, name: str, times: Sequence[int], form: str = ".3f") -> list[str]:
         """The errors after each number of movements."""
-        return [self.error(name, at, form, between=between) for at in times]
+        return [self.error(name, at, form) for at in times]
 
     def less(self, ours: str, theirs: str, at: int = LAST, form: str = ".3f") -> str:
         """Their error minus ours (m), with the interval of this difference."""
@@ -101,17 +101,14 @@ class Page:
         """The share of chosen goals that can be reached, over the goals of all seeds: ``43.4 %``."""
         return self.cell(self.found.near_share, name, form=".1%").replace("%", " %")
 
-    def cell(
-        self, statistic: Statistic, *of: object, form: str = ".3f", between: bool = False, bold: bool = False
-    ) -> str:
-        """A number, with its interval if ``between``. If ``bold``, a number whose interval excludes 1 is bold."""
+    def cell(self, statistic: Statistic, *of: object, form: str = ".3f", between: bool = False) -> str:
+        """A number, with its interval if ``between``."""
         try:
             found = statistic(*of) if between else statistic(*of, level=None)
         except NotRun as missing:
             self.missing.append(str(missing))
             return MISSING_CELL
-        text = show(found, form).replace("-", "−")
-        return f"**{text}**" if bold and (found.low > 1 or found.high < 1) else text
+        return show(found, form).replace("-", "−")
 
     def claims(self, claims: Callable[[Evidence], Sequence[Claim]]) -> str:
         """A table with a row for each claim that has runs."""

@@ -154,7 +154,7 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
             "map-elites-taught-once": {"algorithm": "map-elites-taught", "imitations": 1, **ONCE},
             "cma-me": {"algorithm": "cma-me"},
             "cma-me-taught": {"algorithm": "cma-me-taught"},
-            # Rivals with tuned settings: better than the defaults in a search on other seeds, see results/TUNING.md.
+            # Rivals with tuned settings: better than the defaults in a search on other seeds, see results/RIVALS.md.
             "map-elites-tuned": {"algorithm": "map-elites", "cells": 10},
             "cma-me-tuned": {"algorithm": "cma-me", "sd": 0.05},
             "cma-mae-taught-tuned": {"algorithm": "cma-mae-taught", "sd": 0.05},
@@ -179,9 +179,8 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
                 "practice-uniform": {**PRACTICE, "goals": "uniform"},
                 "practice-interest": {**PRACTICE, "goals": "interest-map"},
                 "practice-taught-every-30": {
-                    **TAUGHT,
+                    "algorithm": "practice-taught",
                     "teacher": "periodic",
-                    "teacher.every": 30,
                     "social.repeats": 10,
                 },
                 "practice-corner": {**TAUGHT, "demonstrations": CORNER},
