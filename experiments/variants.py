@@ -55,7 +55,16 @@ SCHOOL: Final = ("map-elites", "cma-mae")  # algorithms of quality diversity; th
 CORNER, MANY = MADE = (Path("corner.npz"), Path("many.npz"))  # files of demonstrations that ``make_subsets`` writes
 ONCE: Final[Variant] = {"teacher": "initial", "teacher.every": 1}  # at the start, one demonstration a movement
 PRACTICE: Final[Variant] = {"algorithm": "practice"}
-MIDDLE_FIRST: Final[Variant] = {**PRACTICE, "explore.first": 0}  # begun around the middle of Pi, not anywhere
+WIDE: Final[Variant] = {  # practice in one family: it begins with uniform movements, and no goal is the narrow family's
+    **SAGG_RIAC,
+    "inverse": "among-effects",
+    "goals": "within-reach",
+    "search": "vary",
+    "explore": "returning",
+    "budget": 1,
+    "global_range": (0.02, 0.3),
+}
+NARROW: Final[Variant] = {**WIDE, "explore.first": 0}  # one family that begins around the middle of Pi
 TAUGHT: Final[Variant] = {"algorithm": "practice-taught", **ONCE}
 UNTAUGHT: Final[dict[str, Variant]] = {
     "random": {"algorithm": "random"},
@@ -175,7 +184,8 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
             name: {**line, **WHOLE}
             for name, line in {
                 "practice": PRACTICE,
-                "practice-middle": MIDDLE_FIRST,
+                "practice-wide": WIDE,
+                "practice-middle": NARROW,
                 "practice-uniform": {**PRACTICE, "goals": "uniform"},
                 "practice-interest": {**PRACTICE, "goals": "interest-map"},
                 "practice-taught-every-30": {
@@ -187,7 +197,7 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
             }.items()
         },
         "practice-taught": {**TAUGHT, **WHOLE, **FLOOR},
-        **_on_tasks({"practice": PRACTICE, "practice-middle": MIDDLE_FIRST}, TASKS),
+        **_on_tasks({"practice": PRACTICE, "practice-middle": NARROW}, TASKS),
     },
     "asking": {
         **{

@@ -1,7 +1,8 @@
 """Practice, our own algorithm: one movement for each goal within reach, the answer of a local process plus noise.
 
-No option depends on the units or on the robot. A movement that misses its goal corrects the inverse model there. If
-most movements have no effect, practice first looks for movements with an effect, and then learns from these alone.
+No option depends on the units or on the robot. A movement that misses its goal corrects the inverse model there. Every
+third goal is pursued in a family of movements around the middle of Pi (`TwoFamilies`). If most movements have no
+effect, practice first looks for movements with an effect, and then learns from these alone.
     learner = practice(environment, seed)
 """
 
@@ -12,16 +13,19 @@ from functools import partial
 from typing import Any, Final
 
 from sgimd_torch.algorithms import MakeInverse
+from sgimd_torch.algorithms.families import TwoFamilies
 from sgimd_torch.catalogue.options import hands_on
 from sgimd_torch.changes import watched
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.explore.returning import Returning
+from sgimd_torch.explore.widening import Widening
 from sgimd_torch.goals.within_reach import WithinReach
 from sgimd_torch.inverses.among_effects import AmongEffects
 from sgimd_torch.learner import Correspondence, Learner
 from sgimd_torch.memory import Memory
 from sgimd_torch.parts import Problem, Social
 from sgimd_torch.searches.perturb import Vary
+from sgimd_torch.spaces import stream
 from sgimd_torch.strategies import GoalBabbling, Imitate
 
 PRACTICE: Final[dict[str, Any]] = {
@@ -48,8 +52,8 @@ def practice(
     """Practice: one movement for each goal within reach, by a local Gaussian process; no teacher."""
 
     def begin(seed: int, memory: Memory | None) -> Learner:
-        problem = Problem(environment, seed, memory, inverse=inverse)
-        return Learner(problem, GoalBabbling(problem, **parts))
+        families = _families(environment, seed, memory, inverse, parts)
+        return Learner(families.problem, families)
 
     return watched(begin, seed, memory, prior)
 
@@ -72,8 +76,18 @@ def practice_taught(
     """
 
     def begin(seed: int, memory: Memory | None) -> Learner:
-        problem = Problem(environment, seed, memory, inverse=inverse)
-        problem.autonomous = GoalBabbling(problem, **parts)
-        return Learner(problem, problem.autonomous, social=Social.of(social, problem), correspondence=correspondence)
+        families = _families(environment, seed, memory, inverse, parts)
+        problem = families.problem
+        problem.autonomous = families.wide  # its goal model is told of demonstrated goals
+        return Learner(problem, families, social=Social.of(social, problem), correspondence=correspondence)
 
     return watched(begin, seed, memory, prior)
+
+
+def _families(
+    environment: Environment, seed: int, memory: Memory | None, inverse: MakeInverse, parts: dict[str, Any]
+) -> TwoFamilies:
+    """Goal babbling in two families; they share no random stream and no width of exploration."""
+    problem = Problem(environment, seed, memory, inverse=inverse)
+    own = Problem(environment, int(stream(seed, "narrow family").integers(2**63)), inverse=inverse)
+    return TwoFamilies(GoalBabbling(problem, **parts), GoalBabbling(own, **{**parts, "explore": Widening}))

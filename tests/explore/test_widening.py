@@ -66,7 +66,7 @@ def test_it_looks_wide_where_movements_are_alike_and_near_where_they_are_not(mak
     learner = practice(robot, 0)
     for _ in run(learner, robot, 0, movements=150):
         pass
-    assert least <= learner.autonomous.explore.width.sd <= most
+    assert least <= learner.autonomous.wide.explore.width.sd <= most
 
 
 class Ball:
@@ -90,7 +90,7 @@ def test_where_nothing_happens_practice_looks_wider_until_something_does():
 
 
 def test_around_a_copied_movement_practice_looks_half_as_wide_as_it_explores():
-    babbling, known = practice(two_elbows(), 0).autonomous, np.full((1, 3), 0.5)
+    babbling, known = practice(two_elbows(), 0).autonomous.wide, np.full((1, 3), 0.5)
     babbling.explore.width.sd = 0.06
     search = babbling.search(Estimate(known[0], known, np.zeros((1, 2))), np.zeros(2))
     executed = np.array([next(search), *(search.send(np.zeros(2)) for _ in range(1999))])

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from runs import content_of
+from sgimd_torch.algorithms import families
 from sgimd_torch.catalogue import WORDS, about, load_word, place_of
 from sgimd_torch.figures.names import colour, label
 from sgimd_torch.runs import command_line
@@ -205,7 +206,9 @@ PARTS_OF_PRACTICE = {
 }
 
 
-def test_sagg_riac_with_every_part_of_practice_by_name_is_practice():
+def test_sagg_riac_with_every_part_of_practice_by_name_is_its_wide_family(monkeypatch):
+    monkeypatch.setattr(families, "_TURNS", 1000)  # no attempt is narrow
+
     def lived(config):
         parts = build(config)
         episodes = run(parts.learner, parts.environment, 7, movements=120)
