@@ -7,8 +7,9 @@ Nine families: planar and spatial chains, poses (which fill a thin part of their
 maps that do nothing in half of Pi, contexts, periodic parameters. Units go from mm to km. Noise is absent, even,
 grows with the movement, or is one gross error in 33 movements.
 
-Numbers 0 to 199 are for development, 200 to 259 were the page's before practice had a second family. Each error is the mean distance between goals and what the answers do without
-noise. For the references the better of `process` and the nearest exemplar answers.
+Numbers 0 to 199 are for development; 200 to 259 were the page's until practice had two families. Each error is the mean
+distance between goals and what the answers do without noise. For the references the better of `process` and the nearest
+exemplar answers.
 """
 
 from __future__ import annotations

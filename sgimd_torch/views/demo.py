@@ -87,7 +87,7 @@ def configs_of(rest: Sequence[str]) -> dict[str, Config]:
     for name in ("algorithm", "name", "environment"):
         if name in given:
             raise ValueError(f"--{name} cannot be given here: the demo shows its own learners on the fishing rod")
-    words = ["--out=runs/demo", "--evaluate-at=250,1000,2000", f"--environment={ROD}", *rest]
+    words = ["--out=runs/demo", "--evaluate-at=250,1000", "--floor-at=[]", f"--environment={ROD}", *rest]
     configs = {algorithm: parse([*words, f"--algorithm={algorithm}"])[0] for algorithm in LEARNERS}
     if not configs["sgim-d"].evaluations:
         raise ValueError("--evaluate-at [] leaves nothing to draw; choose some movements, or omit it")
