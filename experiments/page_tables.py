@@ -22,7 +22,7 @@ MISSING_CELL: Final = "–"
 # Three variants of each rival: without a teacher, with a demonstration every 30 movements, with all at the start.
 RIVALS: Final[Mapping[str, tuple[str, str, str]]] = {
     "practice": ("practice", "practice-taught-every-30", "practice-taught"),
-    "practice, one family from the middle": ("practice-middle", "", ""),
+    "practice, from the middle only": ("practice-middle", "", ""),
     "SAGG-RIAC; SGIM-D": ("sagg-riac", "sgim-d", "sgim-d-once"),
     "the standard baseline": (UNIFORM, "uniform-nearest-taught", "uniform-nearest-taught-once"),
     "CMA-MAE": ("cma-mae", "cma-mae-taught", "cma-mae-taught-once"),
@@ -41,8 +41,8 @@ GAIN: Final[Mapping[str, str]] = {
     "the standard baseline": UNIFORM,
     "... begun in the middle": "middle",
     "... with `process`": "middle-process",
-    "... and goals within reach: one family, from the middle": "practice-middle",
-    "begun anywhere": "practice-wide",
+    "... and goals within reach": "practice-middle",
+    "... begun with uniform movements": "practice-wide",
     "... and a second family: `practice`": "practice",
     "... but with goals by interest": "practice-interest",
     "... but with uniform goals": "practice-uniform",

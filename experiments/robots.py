@@ -85,7 +85,7 @@ def any_robot(found: Evidence) -> list[Claim]:
         Claim("... less than SAGG-RIAC at each: ratio ≤ 1", less("sagg-riac")),
         Claim("... than the standard baseline", less(BASELINE)),
         Claim("... than with goals by interest", less("practice-interest")),
-        Claim("... than in one family that begins around the middle of Π", less("practice-middle")),
+        Claim("... than if all movements spread from the middle of Π", less("practice-middle")),
     ]
 
 

@@ -55,7 +55,7 @@ SCHOOL: Final = ("map-elites", "cma-mae")  # algorithms of quality diversity; th
 CORNER, MANY = MADE = (Path("corner.npz"), Path("many.npz"))  # files of demonstrations that ``make_subsets`` writes
 ONCE: Final[Variant] = {"teacher": "initial", "teacher.every": 1}  # at the start, one demonstration a movement
 PRACTICE: Final[Variant] = {"algorithm": "practice"}
-WIDE: Final[Variant] = {  # practice in one family: it begins with uniform movements, and no goal is the narrow family's
+WIDE: Final[Variant] = {  # the wide family of practice alone
     **SAGG_RIAC,
     "inverse": "among-effects",
     "goals": "within-reach",
@@ -198,6 +198,7 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
         },
         "practice-taught": {**TAUGHT, **WHOLE, **FLOOR},
         **_on_tasks({"practice": PRACTICE, "practice-middle": NARROW}, TASKS),
+        **_on_tasks({"practice-wide": WIDE}, (task for task in TASKS if task not in SPARSE)),
     },
     "asking": {
         **{

@@ -1,9 +1,9 @@
 """Two families of movements: goal babbling that knows all exemplars, and one that began around the middle of Pi.
 
-Our addition. Uniform movements at the start suit most robots, but each becomes the centre of a family of its own. With
-the fishing rod these families never join, and practice stalls. Goal babbling that spreads from one posture stays in one
-family (Rolf, Steil & Gienger 2010). So a second goal babbling, which knows none of those movements, pursues every third
-goal. Answers come from all movements.
+Our addition. Practice begins with uniform movements, which suit most robots. But each stays the centre of its own
+variations: with the fishing rod these groups never join, and the error stops falling. Movements that spread from one
+posture stay in one group (Rolf, Steil & Gienger 2010). So a second goal babbling pursues every third goal. It is not
+told of the first one's movements, and begins around the middle of Pi. Answers come from all movements.
     TwoFamilies(GoalBabbling(problem, **PRACTICE), GoalBabbling(own_problem, **PRACTICE, explore=Widening))
 """
 
@@ -23,9 +23,9 @@ _TURNS: Final = 3  # number of attempts of which one is narrow
 class TwoFamilies(Strategy):
     """Goal babbling in two families of movements; of three goals the narrow family pursues one.
 
-    The wide family knows all exemplars. The narrow family knows all but those of the wide one: its own, demonstrated
-    and added ones, and those with which the learner begins, as after a change of the robot. It acts once there are 100
-    exemplars. While most movements have no effect, the wide family acts alone: effects are too rare to be kept from it.
+    The wide family knows all exemplars. The narrow family knows all except those of the wide one. If the learner begins
+    again, after a change of the robot or with a prior, both families know the exemplars so far. Narrow attempts begin
+    at 100 exemplars. While most movements have no effect, all attempts are wide: effects are too rare.
 
     Args:
         wide, narrow: goal babbling of each family. The problem of the narrow one begins without exemplars.
@@ -46,27 +46,25 @@ class TwoFamilies(Strategy):
         return self.wide.maker(origin)
 
     def attempt(self, context: Array) -> AskingAttempt:
-        """An attempt at a goal by the family whose turn it is."""
+        """An attempt at a goal by one family; the narrow one is told of its outcomes before it goes on."""
         self._attempts += 1
-        ready = len(self.problem.memory) >= _FIRST and self.problem.inverse.effects() is None
-        yield from self._followed(self.narrow if ready and self._attempts % _TURNS == 0 else self.wide, context)
-
-    def _followed(self, family: GoalBabbling, context: Array) -> AskingAttempt:
-        """An attempt of a family; the narrow one is told of its outcomes before the attempt goes on."""
-        self._tell_narrow(newest=True)
+        self._tell_narrow()
+        turn = self._attempts % _TURNS == 0 and len(self.problem.memory) >= _FIRST
+        narrow = turn and self.problem.inverse.effects() is None
+        family: Strategy = self.narrow if narrow else self.wide
         moves, outcome = family.attempt(context), None
         try:
             while True:
                 outcome = yield moves.send(outcome)
-                self._tell_narrow(newest=family is self.narrow)
+                self._tell_narrow(wide=not narrow)
         except StopIteration:
             return
         finally:
             moves.close()
 
-    def _tell_narrow(self, *, newest: bool) -> None:
-        """Tell the narrow family all new exemplars; ``newest``: the last one, too."""
+    def _tell_narrow(self, *, wide: bool = False) -> None:
+        """Tell the narrow family all new exemplars; ``wide``: not the last one, which is the wide family's."""
         memory, n = self.problem.memory, len(self.problem.memory)
-        new = slice(self._seen, n if newest else n - 1)
+        new = slice(self._seen, n - wide)
         self.narrow.memory.extend(memory.contexts[new], memory.thetas[new], memory.outcomes[new])
         self._seen = n

@@ -35,7 +35,7 @@ PRACTICE: Final[dict[str, Any]] = {
     "budget": 1,
     "global_range": (0.02, 0.3),
 }
-"""Parts and options of `GoalBabbling` that make it practice."""
+"""Parts and options of `GoalBabbling` that make it the wide family of practice."""
 ONCE: Final = partial(Imitate, repeats=1)
 
 
@@ -49,7 +49,10 @@ def practice(
     prior: Memory | None = None,
     **parts: Any,
 ) -> Learner:
-    """Practice: one movement for each goal within reach, by a local Gaussian process; no teacher."""
+    """Practice: one movement for each goal within reach, by a local Gaussian process; no teacher.
+
+    Options hold for both families of movements, but ``explore`` for the wide one alone.
+    """
 
     def begin(seed: int, memory: Memory | None) -> Learner:
         families = _families(environment, seed, memory, inverse, parts)
@@ -72,7 +75,7 @@ def practice_taught(
 ) -> Learner:
     """Practice, one movement for each goal within reach; executes each demonstration once, exactly.
 
-    It learns most when all demonstrations come at the start.
+    It learns most when all demonstrations come at the start. Options as for `practice`.
     """
 
     def begin(seed: int, memory: Memory | None) -> Learner:
@@ -87,7 +90,15 @@ def practice_taught(
 def _families(
     environment: Environment, seed: int, memory: Memory | None, inverse: MakeInverse, parts: dict[str, Any]
 ) -> TwoFamilies:
-    """Goal babbling in two families; they share no random stream and no width of exploration."""
+    """Goal babbling in two families; they share no random stream and no width of exploration.
+
+    A forward model learns from all movements, so the narrow family does without.
+    """
     problem = Problem(environment, seed, memory, inverse=inverse)
+    wide = GoalBabbling(problem, **parts)
+    if problem.trained:
+        inverse, parts = AmongEffects, {**parts, "search": Vary}
     own = Problem(environment, int(stream(seed, "narrow family").integers(2**63)), inverse=inverse)
-    return TwoFamilies(GoalBabbling(problem, **parts), GoalBabbling(own, **{**parts, "explore": Widening}))
+    narrow = GoalBabbling(own, **{**parts, "explore": Widening})
+    problem.remarks += [each for each in own.remarks if each not in problem.remarks]
+    return TwoFamilies(wide, narrow)

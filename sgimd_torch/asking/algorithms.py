@@ -55,7 +55,7 @@ def sgim_acts(
     memory: Memory | None = None,
     **parts: Any,
 ) -> Learner:
-    """SGIM-ACTS: practice; chooses when, whom and what to ask, and how to use the demonstration.
+    """SGIM-ACTS: practice in one family; chooses when, whom and what to ask, and how to use the demonstration.
 
     By default it practises and executes each demonstration once.
 
@@ -87,7 +87,7 @@ def sgim_acts(
 
 
 sgim_im = partial(sgim_acts, emulates=False)
-"""SGIM-IM: practice; chooses when to ask its teacher, and for which goal; only imitates."""
+"""SGIM-IM: practice in one family; chooses when to ask its teacher, and for which goal; only imitates."""
 sgim_acts_search = partial(sgim_acts, **SEARCHING)
 """SGIM-ACTS, as published: a search at each goal instead of practice."""
 sgim_im_search = partial(sgim_im, **SEARCHING)

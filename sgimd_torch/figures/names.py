@@ -11,7 +11,7 @@ _DRAWN: Final = {
     "random": ("Random", "#7f7f7f"),
     "sagg-riac": ("SAGG-RIAC", "#0072b2"),
     "practice": ("Practice", "#332288"),
-    "practice-middle": ("One family, from the middle", "#ddcc77"),
+    "practice-middle": ("From the middle only", "#ddcc77"),
     "practice-interest": ("Practice, by interest", "#88ccee"),
     "practice-taught": ("Practice, taught", "#aa4499"),
     "observation": ("Observation", "#cc79a7"),

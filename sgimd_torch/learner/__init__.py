@@ -7,7 +7,7 @@ autonomous and a social one. The caller owns the loop: ``move = learner.ask(cont
 for a goal. ``learner.listeners.append(print)`` prints every event.
 
 Several robots move at once by ``moves = learner.ask_many(contexts)`` and ``learner.tell_many(outcomes)``. Robot k has
-place k of the learner, where its attempts go on. All robots share one memory, one goal model and one record.
+place k of the learner, where its attempts go on. All robots share one memory, its goal models and one record.
 """
 
 from __future__ import annotations
