@@ -221,8 +221,8 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
 VARIANTS: Final = {name: line for variants in EXPERIMENTS.values() for name, line in variants.items()}
 # Seeds of each experiment. They were first used after the defaults had been frozen.
 SEEDS: Final = {
-    **dict.fromkeys(EXPERIMENTS, range(240, 250)),
-    **dict.fromkeys(("paper", "letter"), range(240, 260)),
+    **dict.fromkeys(EXPERIMENTS, range(245, 255)),
+    **dict.fromkeys(("paper", "letter"), range(245, 260)),
 }
 # The second table, beside results.csv, that gets rows from the runs of an experiment.
 SMALL_TABLES: Final = {"asking": "asked.csv", **dict.fromkeys(("paper", "letter", "large"), "explored.csv")}

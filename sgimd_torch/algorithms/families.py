@@ -2,26 +2,33 @@
 
 Our addition. Practice begins with uniform movements, which suit most robots. But each stays the centre of its own
 variations: with the fishing rod these groups never join, and the error stops falling. Movements that spread from one
-posture stay in one group (Rolf, Steil & Gienger 2010). So a second goal babbling pursues every third goal. It is not
-told of the first one's movements, and begins around the middle of Pi. Answers come from all movements.
+posture stay in one group (Rolf, Steil & Gienger 2010). So a second goal babbling pursues some of the goals. It is not
+told of the first one's movements, and begins around the middle of Pi. Whoever errs less gets more goals, by Thompson
+sampling (Thompson 1933) of the newest errors. Answers come from all movements.
     TwoFamilies(GoalBabbling(problem, **PRACTICE), GoalBabbling(own_problem, **PRACTICE, explore=Widening))
 """
 
 from __future__ import annotations
 
+import math
+from collections import deque
 from collections.abc import Sequence
 from typing import Any, Final
+
+import numpy as np
 
 from sgimd_torch.parts import Part, Strategy
 from sgimd_torch.spaces import Array, AskingAttempt
 from sgimd_torch.strategies import GoalBabbling
 
 _FIRST: Final = 100  # least number of exemplars; until then the wide family alone pursues goals
-_TURNS: Final = 3  # number of attempts of which one is narrow
+_LEARNT, _SHARE = 150, 1 / 3  # exemplars of the narrow family from which on errors decide; its share of goals before
+_NEWEST: Final = 60  # number of movements whose errors decide
+_TINY: Final = 1e-300  # the logarithm of an error of 0 is finite
 
 
 class TwoFamilies(Strategy):
-    """Goal babbling in two families of movements; of three goals the narrow family pursues one.
+    """Goal babbling in two families of movements, which share the goals of the wide family.
 
     The wide family knows all exemplars. The narrow family knows all except those of the wide one. If the learner begins
     again, after a change of the robot or with a prior, both families know the exemplars so far. Narrow attempts begin
@@ -31,10 +38,13 @@ class TwoFamilies(Strategy):
         wide, narrow: goal babbling of each family. The problem of the narrow one begins without exemplars.
     """
 
+    draws_from = "families"
+
     def __init__(self, wide: GoalBabbling, narrow: GoalBabbling) -> None:
         super().__init__(wide.problem)
         self.wide, self.narrow = wide, narrow
-        self._attempts, self._seen = 0, 0  # number of attempts at goals, and of exemplars that `_tell_narrow` has seen
+        self._seen = 0  # number of exemplars that `_tell_narrow` has seen
+        self._errors = deque[tuple[bool, float]](maxlen=_NEWEST)  # whether narrow, and log of the distance to the goal
 
     @property
     def regions(self) -> Sequence[Any]:
@@ -47,20 +57,33 @@ class TwoFamilies(Strategy):
 
     def attempt(self, context: Array) -> AskingAttempt:
         """An attempt at a goal by one family; the narrow one is told of its outcomes before it goes on."""
-        self._attempts += 1
         self._tell_narrow()
-        turn = self._attempts % _TURNS == 0 and len(self.problem.memory) >= _FIRST
-        narrow = turn and self.problem.inverse.effects() is None
-        family: Strategy = self.narrow if narrow else self.wide
-        moves, outcome = family.attempt(context), None
+        goal, narrow = self.wide.goals.sample(context), self._narrow_turn()
+        moves: AskingAttempt = (self.narrow if narrow else self.wide).pursue(context, goal)
+        outcome = None
         try:
             while True:
                 outcome = yield moves.send(outcome)
+                self._errors.append((narrow, math.log(math.dist(outcome, goal) + _TINY)))
                 self._tell_narrow(wide=not narrow)
         except StopIteration:
             return
         finally:
             moves.close()
+
+    def _narrow_turn(self) -> bool:
+        """Whether the narrow family pursues the next goal: it does if its drawn mean error is the smaller one."""
+        if len(self.problem.memory) < _FIRST or self.problem.inverse.effects() is not None:
+            return False
+        if len(self.narrow.memory) < _LEARNT:
+            return bool(self.rng.random() < _SHARE)
+        means = []
+        for family in (False, True):
+            errors = [error for narrow, error in self._errors if narrow is family]
+            if len(errors) < 2:
+                return family
+            means.append(self.rng.normal(np.mean(errors), np.std(errors, ddof=1) / math.sqrt(len(errors))))
+        return bool(means[True] < means[False])
 
     def _tell_narrow(self, *, wide: bool = False) -> None:
         """Tell the narrow family all new exemplars; ``wide``: not the last one, which is the wide family's."""

@@ -1,8 +1,8 @@
 """Practice, our own algorithm: one movement for each goal within reach, the answer of a local process plus noise.
 
-No option depends on the units or on the robot. A movement that misses its goal corrects the inverse model there. Every
-third goal is pursued in a family of movements around the middle of Pi (`TwoFamilies`). If most movements have no
-effect, practice first looks for movements with an effect, and then learns from these alone.
+No option depends on the units or on the robot. A movement that misses its goal corrects the inverse model there. Some
+goals are pursued in a family of movements around the middle of Pi (`TwoFamilies`). If most movements have no effect,
+practice first looks for movements with an effect, and then learns from these alone.
     learner = practice(environment, seed)
 """
 

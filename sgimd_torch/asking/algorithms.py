@@ -55,7 +55,7 @@ def sgim_acts(
     memory: Memory | None = None,
     **parts: Any,
 ) -> Learner:
-    """SGIM-ACTS: practice in one family; chooses when, whom and what to ask, and how to use the demonstration.
+    """SGIM-ACTS: practice in one family; chooses when, whom and what to ask, and how to use the answer.
 
     By default it practises and executes each demonstration once.
 

@@ -32,8 +32,8 @@ class Returning(Explore):
     Args:
         problem: problem to learn. If its inverse model reports no ``effects``, exploration is always that of
             `Widening`.
-        first: number of movements at the start that are uniform in Pi. Thirty suit most robots. With 0 exploration is
-            around the middle of Pi from the start, which suits the rod.
+        first: number of movements at the start that are uniform in Pi. With 0 exploration is around the middle of Pi
+            from the start, which suits the rod.
 
     Raises:
         ValueError: ``first`` is no count.

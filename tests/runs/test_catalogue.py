@@ -207,7 +207,7 @@ PARTS_OF_PRACTICE = {
 
 
 def test_sagg_riac_with_every_part_of_practice_by_name_is_its_wide_family(monkeypatch):
-    monkeypatch.setattr(families, "_TURNS", 1000)  # no attempt is narrow
+    monkeypatch.setattr(families, "_FIRST", 1000)  # no attempt is narrow
 
     def lived(config):
         parts = build(config)
