@@ -26,7 +26,7 @@ ROD: Final = "rod"
 WHOLE: Final[Variant] = {"evaluate_at": (250, 500, 1000, 2000, 5000)}
 END: Final[Variant] = {"evaluate_at": (5000,)}
 SHORT: Final[Variant] = {"movements": 2000, "evaluate_at": (250, 500, 1000, 2000)}
-FLOOR: Final[Variant] = {"floor_at": (5000,)}  # measures the noise floor, too
+FLOOR: Final[Variant] = {"floor_at": (5000,), "repeats": 3}  # measures the noise floor, too
 EXACT: Final[Variant] = {"search.noise": 0.0}  # the simplex without noise
 COMPLETE: Final[Variant] = {
     "search.complete": True,

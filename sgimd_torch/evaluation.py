@@ -161,7 +161,7 @@ def evaluate(
     step: int,
     *,
     context: ArrayLike | None = None,
-    repeats: int = 3,
+    repeats: int = 2,
     between: Callable[[], object] = bool,
 ) -> Evaluation:
     """Execute the answer to every goal once, and ``repeats`` times more to measure the noise.

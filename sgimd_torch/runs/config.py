@@ -74,7 +74,7 @@ class Config:
     board: bool = False
     evaluate_at: tuple[int, ...] | None = None
     evaluated_by: tuple[str, ...] = (OWN,)
-    repeats: int = 3
+    repeats: int = 2
     floor_at: tuple[int, ...] | None = None
     benchmark: Path | None = None
     demonstrations: Path | None = None
