@@ -50,7 +50,7 @@ def test_events_are_made_by_the_learner_alone_and_read_by_the_record():
     assert found == WRITERS
 
 
-@pytest.mark.parametrize(("program", "database", "most"), [(LEARNING, False, 5040), (COMMAND, True, 8050)])
+@pytest.mark.parametrize(("program", "database", "most"), [(LEARNING, False, 5040), (COMMAND, True, 8080)])
 def test_learning_loads_few_lines_of_ours_and_no_database(tmp_path, monkeypatch, program, database, most):
     monkeypatch.setenv("PYTHONPATH", str(PACKAGE.parent))
     sqlite, lines = loaded_by(program, tmp_path)

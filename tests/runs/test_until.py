@@ -42,7 +42,7 @@ def early(tmp_path_factory):
 def test_a_run_ends_as_soon_as_the_expected_error_is_small_and_is_finished(early, whole):
     run = read_run(path_of(early))
     n = run.summary["movements"]
-    assert (n, run.summary["finished"], run.config["movements"]) == (150, True, 260)
+    assert (n, run.summary["finished"], run.config["movements"]) == (200, True, 260)
     assert run.evaluation["movements"].tolist() == [120, n]  # the last evaluation is that of the end, with its noise
     assert np.isfinite(run.evaluation["noise_floor"]).tolist() == [False, True]
     assert run.summary["expected"] == pytest.approx(run.at(n, "expected_error"), rel=1e-9)  # at the same goals
@@ -66,7 +66,7 @@ def test_the_expected_error_is_the_one_that_is_found(early):
 def test_a_run_that_ended_early_stays_ended_when_it_is_resumed(early, words, capsys):
     before = content_of(path_of(early))
     assert go(early, "--until=0.06", "--resume", *words) == 0
-    assert "150 movements, mean error" in capsys.readouterr().out
+    assert "200 movements, mean error" in capsys.readouterr().out
     assert content_of(path_of(early)) == before
     assert read_run(path_of(early)).summary["finished"]
 
@@ -80,7 +80,7 @@ def test_without_its_limit_or_with_a_lower_one_the_run_goes_on_as_if_it_had_neve
 
 def test_a_run_killed_at_its_end_ends_there_when_it_is_resumed(early, tmp_path):
     words = [*ARM.split(), f"--out={tmp_path}", "--until=0.06"]
-    end(stopped_at(150, *words))
+    end(stopped_at(200, *words))
     assert not read_run(path_of(tmp_path)).summary["finished"]
     assert command(main, [*words, "--resume"]) == 0
     assert content_of(path_of(tmp_path)) == content_of(path_of(early))
@@ -88,7 +88,7 @@ def test_a_run_killed_at_its_end_ends_there_when_it_is_resumed(early, tmp_path):
 
 def test_movements_that_are_lost_after_the_end_are_made_again(early, tmp_path):
     assert go(tmp_path, "--until=0.06", "--movements=100") == 0
-    settle(path_of(tmp_path), met=[150, 0.05])
+    settle(path_of(tmp_path), met=[200, 0.05])
     assert go(tmp_path, "--until=0.06", "--resume") == 0
     assert content_of(path_of(tmp_path))["events"] == content_of(path_of(early))["events"]
 
@@ -125,5 +125,5 @@ def test_a_learner_that_does_not_know_how_sure_it_is_cannot_end_early(tmp_path, 
 def test_a_loaded_learner_expects_what_the_run_expected(early):
     learner, run = load_learner(path_of(early)), read_run(path_of(early))
     arm = build(Config(parts={"environment": "planar-arm-7"})).environment
-    expected = evaluate(learner.inverse, arm, run.benchmark, 3, 150, repeats=0).expected
-    assert expected.tolist() == run.missed_by(150)[1].tolist()
+    expected = evaluate(learner.inverse, arm, run.benchmark, 3, 200, repeats=0).expected
+    assert expected.tolist() == run.missed_by(200)[1].tolist()
