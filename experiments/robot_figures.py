@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from changing import ANEW, ARM, BEGUN, CHANGES, GOES_ON, ROBOTS, SIMULATOR, WRONG, after
 from evidence import Evidence
 from random_robots import COUNTS, FAMILIES, LEARNERS, NOISES, RANDOM, kind
-from robots import after_change, best, errors, harmful, over_anew, share
+from robots import COMPARED, after_change, best, errors, harmful, over_anew, share
 from sgimd_torch.figures.names import COLOURS, NAMES
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.statistics import Interval, iqm_interval, rng
@@ -30,7 +30,7 @@ BEGINNINGS: Final = {ANEW: "nothing", GOES_ON: "the simulator", WRONG: "a mirror
 def shares(found: Evidence) -> Figure:
     """Share of random robots on which each learner is best, and on which it is harmful, against movements."""
     figure, panels = _panels("learner is best", "worse than random movements")
-    for ax, statistic, learners in zip(panels, (best, harmful), (LEARNERS, [*LEARNERS][:-1]), strict=True):
+    for ax, statistic, learners in zip(panels, (best, harmful), (LEARNERS, COMPARED), strict=True):
         for name in learners:
             by_count = [statistic(found, name, at) for at in COUNTS]
             _drawn(ax, COUNTS, by_count, COLOURS[name], NAMES[name], "o-")
@@ -64,7 +64,7 @@ def kinds(found: Evidence) -> Figure:
             **{name: (0, name) for name in FAMILIES[::-1]}}  # fmt: skip
     figure = Figure(figsize=(7.5, 5.6), layout="constrained")
     ax = figure.subplots()
-    for name in [*LEARNERS][:-1]:
+    for name in COMPARED:
         means = [np.exp(ratios[name][[each[place] == word for each in of]].mean()) for place, word in rows.values()]
         ax.plot(means, range(len(rows)), "o", color=COLOURS[name], markersize=8, label=NAMES[name])
     ax.axvline(1, color="black", linewidth=1, zorder=0)
