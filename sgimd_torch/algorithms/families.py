@@ -15,8 +15,6 @@ from collections import deque
 from collections.abc import Sequence
 from typing import Any, Final
 
-import numpy as np
-
 from sgimd_torch.parts import Part, Strategy
 from sgimd_torch.spaces import Array, AskingAttempt
 from sgimd_torch.strategies import GoalBabbling
@@ -82,12 +80,14 @@ class TwoFamilies(Strategy):
             errors = [error for narrow, error in self._errors if narrow is family]
             if len(errors) < 2:
                 return family
-            means.append(self.rng.normal(np.mean(errors), np.std(errors, ddof=1) / math.sqrt(len(errors))))
+            n, mean = len(errors), sum(errors) / len(errors)  # numpy takes five times as long for sixty numbers
+            means.append(self.rng.normal(mean, math.sqrt(sum((each - mean) ** 2 for each in errors) / (n - 1) / n)))
         return bool(means[True] < means[False])
 
     def _tell_narrow(self, *, wide: bool = False) -> None:
         """Tell the narrow family all new exemplars; ``wide``: not the last one, which is the wide family's."""
         memory, n = self.problem.memory, len(self.problem.memory)
         new = slice(self._seen, n - wide)
-        self.narrow.memory.extend(memory.contexts[new], memory.thetas[new], memory.outcomes[new])
+        if new.start < new.stop:
+            self.narrow.memory.extend(memory.contexts[new], memory.thetas[new], memory.outcomes[new])
         self._seen = n
