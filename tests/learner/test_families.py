@@ -82,6 +82,19 @@ def test_the_narrow_family_knows_demonstrations_and_movements_of_others():
     assert narrow_rows(learner) == [60, 61]
 
 
+def test_a_narrow_movement_that_fails_is_known_to_nobody(monkeypatch):
+    learner = practice(ARM, 0)
+    for _ in run(learner, ARM, 0, movements=FIRST):
+        pass
+    monkeypatch.setattr(families(learner), "_narrow_turn", lambda: True)
+    known = narrow_rows(learner)
+    learner.ask(NO_CONTEXT)
+    learner.fail("stuck")
+    learner.ask(NO_CONTEXT)
+    assert narrow_rows(learner) == known
+    assert len(learner.memory) == FIRST
+
+
 @pytest.mark.parametrize(("better", "least", "most"), [(False, 0, 0.2), (True, 0.8, 1)])
 def test_the_family_that_errs_less_gets_more_goals(better, least, most):
     found = families(practice(ARM, 0))
