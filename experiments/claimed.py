@@ -164,7 +164,7 @@ def learning(found: Evidence) -> list[Claim]:
         Claim("Suite: `practice` never has a larger error than random movements: ≤ 1.02 times, 250 to 2000",
               on_each_task("random", 1.02)),
         Claim("... nor than the standard baseline: ≤ 1.05 times", on_each_task(UNIFORM, 1.05)),
-        Claim("... over all tasks, a smaller error than the standard baseline: mean ratio ≤ 0.75 at 1000",
+        Claim("... without `puck` and `fetch`, a smaller error than the standard baseline: mean ratio ≤ 0.75 at 1000",
               over_tasks(UNIFORM, 0.75, 1000)),
         Claim("... and than CMA-MAE and MAP-Elites: mean ratios < 1 at 500, 1000, 2000",
               [part for name in ("cma-mae", "map-elites") for part in over_tasks(name, 1.0, 500, 1000, 2000)]),
@@ -186,14 +186,14 @@ def curiosity(found: Evidence) -> list[Claim]:
               less(found, "sgim-d-absolute-large", "sgim-d-uniform-large")),
         Claim("Interest and simplex in this T: SGIM-D − the standard baseline < 0, both with a demonstration every 30 "
               "movements", less(found, "sgim-d-large", "uniform-nearest-taught-large")),
-        Claim("Interest instead of uniform goals in `practice`: < 0 at 1000, 5000",
-              less(found, "practice-interest", "practice-uniform", 1000, LAST)),
+        Claim("Interest instead of goals within reach in `practice`: < 0 at 1000, 5000",
+              less(found, "practice-interest", "practice", 1000, LAST)),
     ]  # fmt: skip
 
 
 def model(found: Evidence) -> list[Claim]:
-    """Claims on SGIM-D with a forward model instead of `process`: one has to prove itself first, one always answers."""
-    proved, always, plain = "sgim-d-model by model", "sgim-d-model-alone by model-alone", "sgim-d"
+    """Claims on SGIM-D with a forward model instead of `process`: one proves itself first, one answers untested."""
+    proved, untested, plain = "sgim-d-model by model", "sgim-d-model-alone by model-alone", "sgim-d"
     on_arms = [
         at_most(1.03, found.ratio, f"sgim-d-model.{arm} by model", f"sgim-d.{arm}", at, name=f"{arm} at {at}")
         for arm in ARMS
@@ -205,11 +205,12 @@ def model(found: Evidence) -> list[Claim]:
                for at, bar in ((1000, 0.055), (2000, 0.042), (LAST, 0.0365))]),
         Claim("... never much larger than with `process`: ≤ 1.03 times, on the rod at 250 to 5000, on arms of 7 and 50 "
               "joints at 250 to 2000", [*times_as_much(found, 1.03, proved, plain, *WHOLE), *on_arms]),
-        Claim("A model that always answers reaches the last error of SGIM-D in ≤ 3000 movements",
-              [at_most(3000, found.time_to_reach, always, plain, form=".0f")]),
+        Claim("A model that answers untested reaches the last error of SGIM-D in ≤ 3000 movements",
+              [at_most(3000, found.time_to_reach, untested, plain, form=".0f")]),
         Claim("... has a smaller error than SGIM-D: < 0 at 1000, 2000, 5000",
-              less(found, always, plain, 1000, 2000, LAST)),
-        Claim("... at 5000 an error below the noise floor of SGIM-D", [at_most(1.0, found.over_floor, always, plain)]),
+              less(found, untested, plain, 1000, 2000, LAST)),
+        Claim("... at 5000 an error below the noise floor of SGIM-D",
+              [at_most(1.0, found.over_floor, untested, plain)]),
     ]  # fmt: skip
 
 

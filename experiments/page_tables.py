@@ -45,7 +45,6 @@ GAIN: Final[Mapping[str, str]] = {
     "... begun with uniform movements": "practice-wide",
     "... and a second family: `practice`": "practice",
     "... but with goals by interest": "practice-interest",
-    "... but with uniform goals": "practice-uniform",
 }
 
 

@@ -74,7 +74,7 @@ UNTAUGHT: Final[dict[str, Variant]] = {
 }
 # Steps from the standard baseline to `practice`.
 MIDDLE: Final[Variant] = {**REFERENCES[UNIFORM], "explore": "widening", "global_range": (0.02, 0.3)}
-# SGIM-D with a forward model that answers once it predicts as well as `process`, and with one that always answers.
+# SGIM-D with a forward model that answers once it predicts as well as `process`, and with one that answers untested.
 MODEL: Final[dict[str, Variant]] = {
     "sgim-d-model": {**SGIM_D, "inverse": "model", "search": "gradient"},
     "sgim-d-model-alone": {**SGIM_D, "inverse": "model-alone", "search": "gradient"},
@@ -186,7 +186,6 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
                 "practice": PRACTICE,
                 "practice-wide": WIDE,
                 "practice-middle": NARROW,
-                "practice-uniform": {**PRACTICE, "goals": "uniform"},
                 "practice-interest": {**PRACTICE, "goals": "interest-map"},
                 "practice-taught-every-30": {
                     "algorithm": "practice-taught",
@@ -221,8 +220,8 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
 VARIANTS: Final = {name: line for variants in EXPERIMENTS.values() for name, line in variants.items()}
 # Seeds of each experiment. They were first used after the defaults had been frozen.
 SEEDS: Final = {
-    **dict.fromkeys(EXPERIMENTS, range(245, 255)),
-    **dict.fromkeys(("paper", "letter"), range(245, 260)),
+    **dict.fromkeys(EXPERIMENTS, range(245, 250)),
+    **dict.fromkeys(("paper", "rivals", "practice"), range(245, 255)),
 }
 # The second table, beside results.csv, that gets rows from the runs of an experiment.
 SMALL_TABLES: Final = {"asking": "asked.csv", **dict.fromkeys(("paper", "letter", "large"), "explored.csv")}
