@@ -20,6 +20,7 @@ from tqdm import tqdm
 from sgimd_torch.catalogue import unknown
 from sgimd_torch.evaluation import RECENT
 from sgimd_torch.figures.names import label
+from sgimd_torch.runs.config import MAY_CHANGE, PLACE, differ
 from sgimd_torch.runs.directory import FILE
 from sgimd_torch.runs.process import say
 from sgimd_torch.runs.read import Run, find_runs, read_run
@@ -32,7 +33,7 @@ USUAL: Final = "sgim-d"  # name of the default baseline
 
 
 def read(place: Path) -> dict[str, list[Run]]:
-    """All runs below a folder, by name of the variant, without their thetas; folders without a run are named.
+    """All runs below a folder, by name of the variant, without their thetas; says what is wrong with folders.
 
     Raises:
         RunError: there are no runs, or one is damaged.
@@ -45,6 +46,11 @@ def read(place: Path) -> dict[str, list[Run]]:
     for name, path in tqdm(found, "reading", unit="", delay=1.0, disable=None):
         run = replace(read_run(path), thetas=np.empty((0, 0)))  # thetas need much memory, and no view shows them
         runs.setdefault(name, []).append(run)
+    for name, several in runs.items():
+        first = several[0].config
+        learners = [option for option in first if option not in (*PLACE, *MAY_CHANGE)]
+        if others := [each for each in learners if any(differ(run.config.get(each), first[each]) for run in several)]:
+            say(f"{name}: its seeds differ in {', '.join(others)}; were two studies given one --name?")
     return runs
 
 

@@ -214,6 +214,15 @@ def test_a_folder_without_a_run_is_named(copied, capsys):
     assert next(line for line in said.out.splitlines() if line.startswith("random")).split()[1] == "4"
 
 
+def test_seeds_of_one_name_with_other_settings_are_named(copied, tiny, capsys):
+    assert not table(copied)
+    assert "differ" not in capsys.readouterr().err
+    options = "--algorithm random --seed 7 --movements 40 --evaluate_at 40 --environment.task_space 3 --repeats 0"
+    assert live([*options.split(), "--benchmark", str(tiny), "--out", str(copied)]) == 0
+    assert table(copied) == 0
+    assert "random: its seeds differ in environment.task_space; were two studies given" in capsys.readouterr().err
+
+
 def last_column(said):
     """Of each variant, and the head of the column."""
     head, *lines = said.splitlines()
