@@ -221,7 +221,7 @@ VARIANTS: Final = {name: line for variants in EXPERIMENTS.values() for name, lin
 # Seeds of each experiment. They were first used after the defaults had been frozen.
 SEEDS: Final = {
     **dict.fromkeys(EXPERIMENTS, range(245, 250)),
-    **dict.fromkeys(("paper", "rivals", "practice"), range(245, 255)),
+    **dict.fromkeys(("paper", "letter", "rivals", "practice"), range(245, 255)),
 }
 # The second table, beside results.csv, that gets rows from the runs of an experiment.
 SMALL_TABLES: Final = {"asking": "asked.csv", **dict.fromkeys(("paper", "letter", "large"), "explored.csv")}
