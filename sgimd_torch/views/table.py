@@ -28,12 +28,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from sgimd_torch.record import RunError
+from sgimd_torch.runs.config import MAY_CHANGE
 from sgimd_torch.runs.process import parser_of, say
 from sgimd_torch.runs.read import Run
 from sgimd_torch.views.results import Column, results
 from sgimd_torch.views.statistics import LEAST_SEEDS
 from sgimd_torch.views.text_table import print_csv, print_latex, print_table
-from sgimd_torch.views.variants import Variant, baseline_of, best_first, compare, read, unit_of
+from sgimd_torch.views.variants import Variant, baseline_of, best_first, compare, differing, read, unit_of
 
 
 def parser() -> argparse.ArgumentParser:
@@ -84,6 +85,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         (print_latex if options.format == "latex" else print_table)(rows)
     if few := [f"{variant.name} ({len(variant.used or variant.runs)})" for variant in variants if variant.few]:
         say(f"fewer than {LEAST_SEEDS} seeds, too few for an interval: {', '.join(few)}")
+    for variant in variants:
+        if others := [option for option in differing([variant]) if option not in MAY_CHANGE]:
+            say(f"{variant.name}: its seeds differ in {', '.join(others)}; were two studies given one --name?")
     say(*(f"left out: {reason}" for reason in left_out))
     return 0
 

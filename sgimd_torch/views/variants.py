@@ -6,12 +6,13 @@ chosen = baseline_of(variants, "random"); [(row.variant.label, row.verdict) for 
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ from tqdm import tqdm
 from sgimd_torch.catalogue import unknown
 from sgimd_torch.evaluation import RECENT
 from sgimd_torch.figures.names import label
-from sgimd_torch.runs.config import MAY_CHANGE, PLACE, differ
+from sgimd_torch.runs.config import PLACE
 from sgimd_torch.runs.directory import FILE
 from sgimd_torch.runs.process import say
 from sgimd_torch.runs.read import Run, find_runs, read_run
@@ -33,7 +34,7 @@ USUAL: Final = "sgim-d"  # name of the default baseline
 
 
 def read(place: Path) -> dict[str, list[Run]]:
-    """All runs below a folder, by name of the variant, without their thetas; says what is wrong with folders.
+    """All runs below a folder, by name of the variant, without their thetas; folders without a run are named.
 
     Raises:
         RunError: there are no runs, or one is damaged.
@@ -46,11 +47,6 @@ def read(place: Path) -> dict[str, list[Run]]:
     for name, path in tqdm(found, "reading", unit="", delay=1.0, disable=None):
         run = replace(read_run(path), thetas=np.empty((0, 0)))  # thetas need much memory, and no view shows them
         runs.setdefault(name, []).append(run)
-    for name, several in runs.items():
-        first = several[0].config
-        learners = [option for option in first if option not in (*PLACE, *MAY_CHANGE)]
-        if others := [each for each in learners if any(differ(run.config.get(each), first[each]) for run in several)]:
-            say(f"{name}: its seeds differ in {', '.join(others)}; were two studies given one --name?")
     return runs
 
 
@@ -64,6 +60,21 @@ def unit_of(variants: Sequence[Variant]) -> Callable[[str], str]:
     first = variants[0].space
     same = all(variant.space.unit == first.unit for variant in variants)
     return first.in_unit if same else lambda quantity: f"{quantity} (unit of T)"
+
+
+def differing(variants: Sequence[Variant]) -> dict[str, list[str]]:
+    """Settings in which runs differ, except the seed and the folders, with the values of each variant as text."""
+    found = {}
+    for name in dict.fromkeys(name for variant in variants for run in variant.runs for name in run.config):
+        values = [dict.fromkeys(shown(run.config.get(name)) for run in variant.runs) for variant in variants]
+        if name not in PLACE and len(set().union(*values)) > 1:
+            found[name] = [" or ".join(each) for each in values]
+    return found
+
+
+def shown(value: Any) -> str:
+    """A value of a setting or version as text, a dash for None."""
+    return "–" if value is None else value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
 
 
 class Variant:

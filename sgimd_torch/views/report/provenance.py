@@ -5,16 +5,14 @@ doubts(variants)    # ["1 run not finished: ..."];   commands(variant.runs)    #
 
 from __future__ import annotations
 
-import json
 import shlex
 from collections.abc import Iterator, Sequence
-from typing import Any, Final
+from typing import Final
 
-from sgimd_torch.runs.config import PLACE
 from sgimd_torch.runs.process import printable
 from sgimd_torch.runs.read import Run
 from sgimd_torch.views.statistics import LEAST_SEEDS
-from sgimd_torch.views.variants import Variant
+from sgimd_torch.views.variants import Variant, differing, shown
 
 AGAIN: Final = "runs/again"  # folder for the repeated runs
 
@@ -70,20 +68,5 @@ def commands(runs: Sequence[Run]) -> list[str]:
     return lines
 
 
-def differing(variants: Sequence[Variant]) -> dict[str, list[str]]:
-    """Settings in which runs differ, except the seed and the folders, with the values of each variant as text."""
-    found = {}
-    for name in dict.fromkeys(name for variant in variants for run in variant.runs for name in run.config):
-        values = [dict.fromkeys(shown(run.config.get(name)) for run in variant.runs) for variant in variants]
-        if name not in PLACE and len(set().union(*values)) > 1:
-            found[name] = [" or ".join(each) for each in values]
-    return found
-
-
 def _count(n: int) -> str:
     return f"{n} run{'s' * (n != 1)}"
-
-
-def shown(value: Any) -> str:
-    """A value of a setting or version as text, a dash for None."""
-    return "–" if value is None else value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
