@@ -99,7 +99,7 @@ class Page:
 
     def near(self, name: str) -> str:
         """The share of chosen goals that can be reached, over the goals of all seeds: ``43.4 %``."""
-        return self.cell(self.found.near_share, name, form=".1%").replace("%", " %")
+        return self.cell(self.found.near_share, name, form=".1%")
 
     def cell(self, statistic: Statistic, *of: object, form: str = ".3f", between: bool = False) -> str:
         """A number, with its interval if ``between``."""
@@ -108,7 +108,7 @@ class Page:
         except NotRun as missing:
             self.missing.append(str(missing))
             return MISSING_CELL
-        return show(found, form).replace("-", "−")
+        return show(found, form).replace("-", "−").replace("%", " %")
 
     def claims(self, claims: Callable[[Evidence], Sequence[Claim]]) -> str:
         """A table with a row for each claim that has runs."""
