@@ -17,7 +17,7 @@ from sgimd_torch.forward_model.search import GradientSearch
 from sgimd_torch.inverses.local import LocalInverse
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner.events import Kind
-from sgimd_torch.record.lives import load_life, save_life
+from sgimd_torch.record.saving import load_life, save_life
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Failure, stream
 from sgimd_torch.teachers import PeriodicTeacher
