@@ -248,3 +248,18 @@ class Teacher(Built):
     @abstractmethod
     def offer(self, index: int, memory: Memory) -> Demonstration | None:
         """The demonstration before movement ``index`` (0, 1, ...) of the learner with this ``memory``, or None."""
+
+
+class Demonstrator(Built):
+    """Teacher who is asked for a demonstration of a goal. Built from ``(demonstrations, rng)`` and options.
+
+    Attributes:
+        takes: duration of a reply, in movements, for which the learner rests.
+    """
+
+    takes: int = 0
+
+    @abstractmethod
+    def demonstrate(self, context: Array, goal: Array, memory: Memory) -> Demonstration | None:
+        """A demonstration of ``goal`` ``(outcome_dim,)`` in ``context`` ``(context_dim,)``, or None. A replayed
+        run repeats the request and needs an equal reply, so random draws must depend only on seed and arguments."""

@@ -16,8 +16,7 @@ from sgimd_torch.environments.protocol import Environment, FromFiles
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.files import checksum
 from sgimd_torch.learner import Learner
-from sgimd_torch.learner.requests import Demonstrator
-from sgimd_torch.parts import Inverse, Teacher
+from sgimd_torch.parts import Demonstrator, Inverse, Teacher
 from sgimd_torch.runs.at_once import check_at_once
 from sgimd_torch.runs.config import ALGORITHM, OWN, Config
 from sgimd_torch.runs.tasks import Task, benchmark_of

@@ -9,8 +9,8 @@ from sgimd_torch.runs.build import build
 from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.load import load_learner
-from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import finished, read_run
+from sgimd_torch.runs.signals import command
 
 ARM = "--environment planar-arm-7 --seed 3 --movements 260 --evaluate-at 120"
 
