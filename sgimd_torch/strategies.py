@@ -275,7 +275,7 @@ class Remember(Social):
         yield from ()  # makes this a generator
 
 
-def watched(attempt: Attempt, executed: list[tuple[Array, Array]]) -> Attempt:
+def recording_outcomes(attempt: Attempt, executed: list[tuple[Array, Array]]) -> Attempt:
     """The movements of ``attempt``; each theta is appended to ``executed`` with its outcome.
 
     The memory may have outcomes of other robots in between.

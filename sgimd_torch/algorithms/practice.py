@@ -15,7 +15,7 @@ from typing import Any, Final
 from sgimd_torch.algorithms import MakeInverse
 from sgimd_torch.algorithms.families import TwoFamilies
 from sgimd_torch.catalogue.options import hands_on
-from sgimd_torch.changes import watched
+from sgimd_torch.changes import noticing_changes
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.explore.returning import Returning
 from sgimd_torch.explore.widening import Widening
@@ -58,7 +58,7 @@ def practice(
         families = _families(environment, seed, memory, inverse, parts)
         return Learner(families.problem, families)
 
-    return watched(begin, seed, memory, prior)
+    return noticing_changes(begin, seed, memory, prior)
 
 
 @hands_on(GoalBabbling, **PRACTICE)
@@ -84,7 +84,7 @@ def practice_taught(
         problem.autonomous = families.wide  # its goal model is told of demonstrated goals
         return Learner(problem, families, social=Social.of(social, problem), correspondence=correspondence)
 
-    return watched(begin, seed, memory, prior)
+    return noticing_changes(begin, seed, memory, prior)
 
 
 def _families(

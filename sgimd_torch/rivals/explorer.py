@@ -11,7 +11,7 @@ import numpy as np
 
 from sgimd_torch.parts import Problem, Social, Strategy
 from sgimd_torch.spaces import Array, Attempt, Demonstration, Move
-from sgimd_torch.strategies import Mimic, watched
+from sgimd_torch.strategies import Mimic, recording_outcomes
 
 if TYPE_CHECKING:
     from ribs.schedulers import Scheduler
@@ -86,7 +86,7 @@ class Shown(Social):
         """The movements of the imitation."""
         executed: list[tuple[Array, Array]] = []
         try:
-            yield from watched(self.mimic.attempt(context, theta_d, demonstration), executed)
+            yield from recording_outcomes(self.mimic.attempt(context, theta_d, demonstration), executed)
         finally:  # interruption by the next demonstration included
             if executed:
                 thetas, outcomes = zip(*executed, strict=True)
