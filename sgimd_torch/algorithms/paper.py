@@ -14,13 +14,13 @@ from collections.abc import Callable
 from typing import Any
 
 from sgimd_torch.algorithms import MakeInverse
-from sgimd_torch.catalogue.options import hands_on
 from sgimd_torch.changes import watched
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Correspondence, Learner
 from sgimd_torch.memory import Memory
+from sgimd_torch.options.signature import hands_on
 from sgimd_torch.parts import Problem, Social
 from sgimd_torch.searches.simplex import NelderMead
 from sgimd_torch.strategies import Babble, GoalBabbling, Imitate, Mimic, Remember, Rest

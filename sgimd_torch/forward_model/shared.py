@@ -8,10 +8,10 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
-from sgimd_torch.catalogue.options import hands_on
 from sgimd_torch.forward_model.listener import ModelListener
 from sgimd_torch.forward_model.model import ForwardModel, Refresh
 from sgimd_torch.memory import Memory
+from sgimd_torch.options.signature import hands_on
 from sgimd_torch.parts import Inverse, Problem, Trained
 
 

@@ -15,11 +15,11 @@ from typing import Any, Final
 import numpy as np
 
 from sgimd_torch.algorithms import MakeInverse
-from sgimd_torch.catalogue.options import hands_on
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Correspondence, Learner
 from sgimd_torch.memory import Memory
+from sgimd_torch.options.signature import hands_on
 from sgimd_torch.parts import Problem
 from sgimd_torch.rivals.explorer import QualityDiversity, Shown
 from sgimd_torch.spaces import check_count

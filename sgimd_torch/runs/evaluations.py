@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from sgimd_torch.evaluation import Evaluation, evaluate, expected_errors, tile_goals, tile_side
+from sgimd_torch.options.build import RunParts
+from sgimd_torch.options.config import OWN
 from sgimd_torch.parts import Inverse
 from sgimd_torch.record import Record
-from sgimd_torch.runs.build import RunParts
-from sgimd_torch.runs.config import OWN
 from sgimd_torch.spaces import Array, stream
 
 if TYPE_CHECKING:

@@ -12,11 +12,11 @@ from typing import Final
 
 import numpy as np
 
-from sgimd_torch.catalogue.options import read
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.files import check_regular
 from sgimd_torch.learner.events import Kind
 from sgimd_torch.memory import Memory
+from sgimd_torch.options.signature import read
 from sgimd_torch.record import Record, RunError
 from sgimd_torch.spaces import Array, Box, check_vector
 

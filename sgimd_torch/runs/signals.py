@@ -20,7 +20,7 @@ from functools import partial
 from types import FrameType
 from typing import Any, Final, Self, TextIO
 
-from sgimd_torch.catalogue.options import read, wanted
+from sgimd_torch.options.signature import read, wanted
 
 REPORT_EVERY: Final = 20.0  # s between two lines of progress if stderr is no terminal
 SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)

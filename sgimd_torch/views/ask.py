@@ -21,11 +21,11 @@ from pathlib import Path
 
 import numpy as np
 
-from sgimd_torch.catalogue.options import read
 from sgimd_torch.environments.motor_primitives import GaussianPrimitive
 from sgimd_torch.environments.protocol import primitive_of
 from sgimd_torch.files import write_text
-from sgimd_torch.runs.build import RunParts
+from sgimd_torch.options.build import RunParts
+from sgimd_torch.options.signature import read
 from sgimd_torch.runs.load import load_parts
 from sgimd_torch.runs.signals import parser_of
 from sgimd_torch.spaces import Array, Box, stream

@@ -9,10 +9,10 @@ import pytest
 
 import sgimd_torch
 from sgimd_torch import parts
-from sgimd_torch.catalogue import WORDS, function_of
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.goals.uniform import UniformGoals
 from sgimd_torch.inverses.nearest import NearestNeighbour
+from sgimd_torch.options.catalogue import WORDS, function_of
 from sgimd_torch.parts import Goals
 from sgimd_torch.searches.simplex import NelderMead
 from sgimd_torch.strategies import GoalBabbling
@@ -29,7 +29,7 @@ KINDS = {
 }
 LEARNING = (
     *("parts", "strategies", "algorithms", "learner", "session", "goals", "inverses", "searches", "explore", "asking"),
-    *("rivals", "teachers", "forward_model", "competence", "evaluation", "runs/build", "runs/run"),
+    *("rivals", "teachers", "forward_model", "competence", "evaluation", "options/build", "runs/run"),
 )
 BY_NAME = {"getattr", "hasattr", "attrgetter"}
 FIELDS = {  # files and definitions that may look up members by name, because they handle all fields of a class; why
@@ -39,9 +39,9 @@ FIELDS = {  # files and definitions that may look up members by name, because th
 }
 SIGNATURES = {"signature", "Signature", "getfullargspec", "parameters_of", "__code__", "__defaults__", "__kwdefaults__"}
 OPTIONS = {  # files and definitions that may read the parameters of a function; why
-    ("catalogue/options", None): "the signature is the option",
-    ("runs/config", None): "options of the parts that a run has chosen",
-    ("catalogue/__init__", "called"): "refuses what a user's own function does not take",
+    ("options/signature", None): "the signature is the option",
+    ("options/config", None): "options of the parts that a run has chosen",
+    ("options/catalogue", "called"): "refuses what a user's own function does not take",
 }
 
 

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from runs import ROOT, arguments, content_of
-from sgimd_torch.catalogue import WORDS
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
+from sgimd_torch.options.build import build
+from sgimd_torch.options.catalogue import WORDS
+from sgimd_torch.options.config import Config
 from sgimd_torch.runs import evaluations
-from sgimd_torch.runs.build import build
-from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.read import config_of, read_run
 from sgimd_torch.runs.run import RunLoop
 from sgimd_torch.runs.signals import Progress, Stopped, Stopping

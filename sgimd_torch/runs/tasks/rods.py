@@ -8,11 +8,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from sgimd_torch.catalogue.options import hands_on
 from sgimd_torch.demonstrations import SHIPPED as SHIPPED_DEMONSTRATIONS
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.evaluation import SHIPPED as SHIPPED_BENCHMARK
+from sgimd_torch.options.signature import hands_on
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.spaces import Box, Demonstration
 

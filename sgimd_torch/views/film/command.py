@@ -29,7 +29,7 @@ from tqdm import tqdm
 from sgimd_torch.environments.sketch import Sketch
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.figures.names import colour, label
-from sgimd_torch.runs.build import RunParts, build
+from sgimd_torch.options.build import RunParts, build
 from sgimd_torch.runs.read import Run, config_of, read_run
 from sgimd_torch.runs.signals import parser_of, say
 from sgimd_torch.spaces import Array, stream

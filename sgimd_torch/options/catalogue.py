@@ -3,7 +3,7 @@
     load_word("goals", "grid")                    # ProgressGrid, which is imported now
     load_word("goals", "mypackage.goals:Curious") # a class of your own
 To remove a feature, delete its folder and its lines of this table. The help text of a name is the first line of the
-docstring at its place. The options are keywords of the signature there (`sgimd_torch.catalogue.options`).
+docstring at its place. The options are keywords of the signature there (`sgimd_torch.options.signature`).
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ WORDS: Final[dict[str, dict[str, str]]] = {
         "slow": "asking.teachers:slow",
     },
     "command": {
-        "run": "runs.command_line",
+        "run": "options.command_line",
         "sweep": "runs.sweep",
         "check": "views.check",
         "demonstrations": "views.demonstrations",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC
 from typing import Any, Self
 
-from sgimd_torch.catalogue import called, function_of, place_of
+from sgimd_torch.options.catalogue import called, function_of, place_of
 
 
 class Built(ABC):  # noqa: B024

@@ -2,7 +2,7 @@
 
 Defaults are those of the library, so a run with one changed option is an ablation.
     config = Config(algorithm="sagg-riac", parts={"goals": "grid", "goals.window": 12}); config["search.noise"]
-Options of a part are the keywords of its signature (`sgimd_torch.catalogue.options`). A keyword that is called like a
+Options of a part are the keywords of its signature (`sgimd_torch.options.signature`). A keyword that is called like a
 kind of the catalogue, such as ``goals``, chooses another part.
 """
 
@@ -17,8 +17,8 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, Final, NamedTuple, Self
 
-from sgimd_torch.catalogue import PLACES, ROD, TAUGHT_BY, WORDS, did_you_mean, load_word, place_of, word_of
-from sgimd_torch.catalogue.options import Option, choices_of, options_of, parameters_of
+from sgimd_torch.options.catalogue import PLACES, ROD, TAUGHT_BY, WORDS, did_you_mean, load_word, place_of, word_of
+from sgimd_torch.options.signature import Option, choices_of, options_of, parameters_of
 
 OWN: Final = "own"  # name of the run's own inverse model
 FILES: Final = ("benchmark", "demonstrations", "begin_with")  # options that name a file

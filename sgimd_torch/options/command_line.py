@@ -14,8 +14,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from sgimd_torch.catalogue.options import Option, read, wanted
-from sgimd_torch.runs.config import FLAGS, RUN, Config, chosen, dashed
+from sgimd_torch.options.config import FLAGS, RUN, Config, chosen, dashed
+from sgimd_torch.options.signature import Option, read, wanted
 from sgimd_torch.runs.signals import Stopping, loading
 
 
@@ -26,7 +26,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     program = ["sgimd"] if Path(sys.argv[0]).name == "sgimd" else [sys.executable, "-m", "sgimd_torch"]
     again = [*program, "run", *argv, *([] if flags["resume"] else ["--resume"])]
     with loading():
-        from sgimd_torch.runs.build import build  # imported here so that --help is fast
+        from sgimd_torch.options.build import build  # imported here so that --help is fast
         from sgimd_torch.runs.directory import with_found_earlier
         from sgimd_torch.runs.run import run_one
     parts = build(with_found_earlier(config))
@@ -47,7 +47,7 @@ def parse(argv: Sequence[str], description: str | None = None) -> tuple[Config, 
         given, asked = _read(argv)
         choices = {"algorithm": Config.algorithm, **given}
         if "help" in asked:
-            from sgimd_torch.runs.help import help_on, overview  # imported here, as runs show no help
+            from sgimd_torch.options.help import help_on, overview  # imported here, as runs show no help
 
             print(help_on(chosen(choices)) if given else overview(description))
             raise SystemExit(0)

@@ -15,7 +15,7 @@ from functools import cache, wraps
 from pathlib import Path
 from typing import Any, Final, NamedTuple, TypeVar, cast
 
-from sgimd_torch.catalogue import WORDS, function_of
+from sgimd_torch.options.catalogue import WORDS, function_of
 
 F = TypeVar("F", bound=Callable[..., Any])
 _SIMPLE: Final = (int, float, bool, str, Path, type(None), ...)

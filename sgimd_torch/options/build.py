@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from sgimd_torch.catalogue import called, function_of, load_word
 from sgimd_torch.changes import check_watcher
 from sgimd_torch.environments.protocol import Environment, FromFiles
 from sgimd_torch.evaluation import Benchmark
@@ -18,9 +17,10 @@ from sgimd_torch.files import checksum
 from sgimd_torch.inverses.among_effects import AmongEffects
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Learner
+from sgimd_torch.options.catalogue import called, function_of, load_word
+from sgimd_torch.options.config import ALGORITHM, OWN, Config
 from sgimd_torch.parts import Demonstrator, Inverse, Teacher
 from sgimd_torch.runs.at_once import check_at_once
-from sgimd_torch.runs.config import ALGORITHM, OWN, Config
 from sgimd_torch.runs.tasks import Task, benchmark_of
 from sgimd_torch.spaces import Demonstration, stream
 
