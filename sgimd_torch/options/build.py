@@ -17,7 +17,7 @@ from sgimd_torch.files import checksum
 from sgimd_torch.inverses.among_effects import AmongEffects
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Learner
-from sgimd_torch.options.catalogue import called, function_of, load_word
+from sgimd_torch.options.catalogue import call_checked, function_of, load_word
 from sgimd_torch.options.config import ALGORITHM, OWN, Config
 from sgimd_torch.parts import Demonstrator, Inverse, Teacher
 from sgimd_torch.runs.at_once import check_at_once
@@ -55,9 +55,9 @@ class RunParts:
         return self.task.environment
 
     @property
-    def answers(self) -> dict[str, Inverse]:
+    def inverses(self) -> dict[str, Inverse]:
         """Inverse models for evaluations, by name, the run's own first; after a change of the robot they are others."""
-        return _answers(self.config, self.learner)
+        return _inverses(self.config, self.learner)
 
 
 def build(config: Config) -> RunParts:
@@ -100,13 +100,13 @@ def build(config: Config) -> RunParts:
         notes = [*notes, f"begins with {len(shown['prior'])} movements of {config.begin_with}, as far as they help"]
         begin_with_crc32 = checksum(config.begin_with)
     algorithm = f"algorithm {config.algorithm}"
-    learner = called(algorithm, config.constructor(ALGORITHM), task.environment, config.seed, **shown)
+    learner = call_checked(algorithm, config.constructor(ALGORITHM), task.environment, config.seed, **shown)
     if not isinstance(learner, Learner):
         raise ValueError(f"{algorithm} must return a Learner, got a {type(learner).__name__}")
     if config.until is not None and not isinstance(learner.inverse, LocalProcess | AmongEffects):
         name = type(learner.inverse).__name__
         raise ValueError(f"--until needs an inverse model that says how sure it is, such as process; {name} does not")
-    _answers(config, learner)  # made now, so that their remarks are among the notes
+    _inverses(config, learner)  # made now, so that their remarks are among the notes
     check_watcher(learner)  # an answer may have a forward model
     return RunParts(
         config=config,
@@ -130,11 +130,11 @@ def task_of(config: Config) -> Task:
     Raises:
         ValueError: the environment cannot be built, or is no environment.
     """
-    task = called(f"environment {config['environment']}", config.constructor("environment"))
+    task = call_checked(f"environment {config['environment']}", config.constructor("environment"))
     return task if isinstance(task, Task) else Task(task)
 
 
-def _answers(config: Config, learner: Learner) -> dict[str, Inverse]:
+def _inverses(config: Config, learner: Learner) -> dict[str, Inverse]:
     problem, found = learner.problem, {OWN: learner.inverse}
     for word in config.evaluated_by[1:]:
         make = partial(Inverse.of, load_word("inverse", word), problem)

@@ -229,7 +229,7 @@ def function_of(made: Callable[..., Any]) -> Callable[..., Any]:
     return function_of(made.func) if isinstance(made, partial) else made
 
 
-def called(what: str, make: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
+def call_checked(what: str, make: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
     """Result of a call of ``make``, which may be code of a user.
 
     Raises:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from sgimd_torch.options.config import FLAGS, RUN, Config, chosen, dashed
-from sgimd_torch.options.signature import Option, read, wanted
+from sgimd_torch.options.signature import Option, parsed, wanted
 from sgimd_torch.runs.signals import Stopping, loading
 
 
@@ -52,7 +52,7 @@ def parse(argv: Sequence[str], description: str | None = None) -> tuple[Config, 
             print(help_on(chosen(choices)) if given else overview(description))
             raise SystemExit(0)
         options = RUN | {name: each for part in chosen(choices).values() for name, each in part.options.items()}
-        values = {name: _typed(name, text, options) for name, text in given.items()}
+        values = {name: _value(name, text, options) for name, text in given.items()}
         own = {name: values.pop(name) for name in RUN if name in values}
         return Config(**own, parts=values), {flag: flag in asked for flag in FLAGS}
     except ValueError as error:
@@ -88,13 +88,13 @@ def _read(argv: Sequence[str]) -> tuple[dict[str, str], set[str]]:
     return given, asked
 
 
-def _typed(name: str, text: str, options: Mapping[str, Option]) -> Any:
+def _value(name: str, text: str, options: Mapping[str, Option]) -> Any:
     """A typed value, converted to the type of its option; names of parts and values of unknown options stay text.
 
     Raises:
         ValueError: the value is of another type.
     """
     try:
-        return read(text, options[name].kind) if name in options else text
+        return parsed(text, options[name].kind) if name in options else text
     except ValueError as error:
         raise ValueError(f"--{dashed(name)} must be {wanted(options[name].kind)}, got {text}") from error

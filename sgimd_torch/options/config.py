@@ -168,7 +168,7 @@ class Config:
     @property
     def settings(self) -> dict[str, Any]:
         """All options of this run as json values; ``from_settings`` makes the run from them."""
-        return plain({**self.values, **{name: getattr(self, name) for name in RUN}})
+        return as_json({**self.values, **{name: getattr(self, name) for name in RUN}})
 
     @classmethod
     def from_settings(cls, settings: Mapping[str, Any]) -> Self:
@@ -309,7 +309,7 @@ def words(config: Config) -> list[str]:
     """Arguments of ``sgimd run`` for a run: ``--dashed-name=value`` for the algorithm and each changed option."""
     own = {name: getattr(config, name) for name in RUN}
     own = {name: value for name, value in own.items() if value != RUN[name].default or name == "algorithm"}
-    return [f"--{dashed(name)}={typed(value)}" for name, value in {**own, **dict(config.parts)}.items()]
+    return [f"--{dashed(name)}={as_text(value)}" for name, value in {**own, **dict(config.parts)}.items()]
 
 
 def differ(one: Any, other: Any) -> bool:
@@ -322,13 +322,13 @@ def dashed(name: str) -> str:
     return name.replace("_", "-")
 
 
-def plain(value: Any) -> Any:
+def as_json(value: Any) -> Any:
     """Value of an option as a json value."""
     return json.loads(json.dumps(value, default=str))
 
 
-def typed(value: Any) -> str:
+def as_text(value: Any) -> str:
     """Value of an option as a user types it."""
     if isinstance(value, tuple):
-        return ",".join(map(typed, value)) or "[]"
+        return ",".join(map(as_text, value)) or "[]"
     return json.dumps(value) if value is None or isinstance(value, bool) else str(value)

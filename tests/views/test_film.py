@@ -176,7 +176,7 @@ def test_the_memory_rebuilt_from_the_log_judges_as_the_living_one_did(tmp_path, 
     assert (run.demonstration[:35] >= 0).any()
     film.remember(run, parts, 0, 20)
     film.remember(run, parts, 20, 35)  # in two steps, as a film of several stages does
-    seen = evaluate(parts.answers["own"], parts.environment, parts.benchmark.goals, 3, 35, repeats=0)
+    seen = evaluate(parts.inverses["own"], parts.environment, parts.benchmark.goals, 3, 35, repeats=0)
     assert seen.mean_error == run.evaluation["mean_error"][0]
 
 
