@@ -110,12 +110,8 @@ class Trained(ABC):
     """Object that parts share and that is trained while the learner moves, such as a forward model."""
 
     @abstractmethod
-    def refresh(self, memory: Memory) -> Any:
+    def refresh(self, memory: Memory) -> object:
         """Learn from the newest exemplars in ``memory``."""
-
-    @abstractmethod
-    def listener(self, life: Any) -> Any:
-        """Listener (`runs.run.Listener`) that calls `refresh` in the run ``life`` (`runs.run.RunLoop`)."""
 
 
 class Goals(Part):
@@ -150,6 +146,8 @@ class Goals(Part):
 
 class Inverse(Part):
     """Inverse model: infers a movement for a goal (section 4.4.2). It reads the memory and draws nothing."""
+
+    says_how_sure: ClassVar[bool] = True  # whether estimates may have ``expected`` and ``sd``
 
     @abstractmethod
     def __call__(self, context: Array, goal: Array) -> Estimate:
@@ -225,6 +223,8 @@ class Strategy(Part):
 
 class Social(Part):
     """Social strategy: what a learner does after a demonstration (sections 3.2.3 and 4.2)."""
+
+    remembers: ClassVar[bool] = False  # whether demonstrations enter the memory
 
     @abstractmethod
     def attempt(self, context: Array, theta_d: Array, demonstration: Demonstration) -> Attempt:

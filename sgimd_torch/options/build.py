@@ -14,8 +14,6 @@ from sgimd_torch.changes import check_watcher
 from sgimd_torch.environments.protocol import Environment, FromFiles
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.files import checksum
-from sgimd_torch.inverses.among_effects import AmongEffects
-from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Learner
 from sgimd_torch.options.catalogue import call_checked, function_of, load_word
 from sgimd_torch.options.config import ALGORITHM, OWN, Config
@@ -103,7 +101,7 @@ def build(config: Config) -> RunParts:
     learner = call_checked(algorithm, config.constructor(ALGORITHM), task.environment, config.seed, **shown)
     if not isinstance(learner, Learner):
         raise ValueError(f"{algorithm} must return a Learner, got a {type(learner).__name__}")
-    if config.until is not None and not isinstance(learner.inverse, LocalProcess | AmongEffects):
+    if config.until is not None and not learner.inverse.says_how_sure:
         name = type(learner.inverse).__name__
         raise ValueError(f"--until needs an inverse model that says how sure it is, such as process; {name} does not")
     _inverses(config, learner)  # made now, so that their remarks are among the notes

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import partial
-from typing import Final, Protocol, Self
+from typing import Final, Protocol, Self, runtime_checkable
 
 from sgimd_torch.environments.protocol import FAILURES, SimulationError
 from sgimd_torch.evaluation import Evaluation
@@ -88,7 +88,9 @@ class RunLoop:
         self.seconds = Seconds(self.record.about.get("seconds", {}))
         self.evaluations = Evaluations(parts, self.record)
         parts.learner.listeners.append(self._hear)
-        self.listeners: list[Listener] = [each.listener(self) for each in parts.learner.problem.trained]
+        self.listeners: list[Listener] = [
+            part.listener(self) for part in parts.learner.problem.trained if isinstance(part, Listening)
+        ]
         if parts.config.board:
             from sgimd_torch.board.listener import BoardListener  # loaded here, as most runs have no board
 
@@ -307,6 +309,14 @@ class Listener(Protocol):
     def close(self) -> None:
         """The run has ended, or was stopped."""
         return
+
+
+@runtime_checkable
+class Listening(Protocol):
+    """A trained part of a learner that has a listener in a run."""
+
+    def listener(self, life: RunLoop) -> Listener:
+        """The listener in the run ``life``."""
 
 
 class Seconds:

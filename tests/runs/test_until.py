@@ -116,6 +116,23 @@ def test_a_limit_that_is_no_error_is_refused_in_a_line(tmp_path, capsys, until):
     assert not list(tmp_path.iterdir())
 
 
+SURE = """
+from sgimd_torch.inverses.nearest import NearestNeighbour
+from sgimd_torch.parts import Inverse
+
+class Sure(Inverse):
+    def __call__(self, context, goal):
+        estimate = NearestNeighbour(self.problem)(context, goal)
+        return estimate._replace(expected=goal, sd=0.01)
+"""
+
+
+def test_an_inverse_model_of_a_users_own_that_says_how_sure_it_is_ends_the_run(tmp_path, module):
+    module("confident", SURE)
+    assert go(tmp_path, "--until=0.02", "--inverse=confident:Sure") == 0
+    assert read_run(path_of(tmp_path)).summary["movements"] == 50
+
+
 def test_a_learner_that_does_not_know_how_sure_it_is_cannot_end_early(tmp_path, capsys):
     assert go(tmp_path, "--until=0.1", "--inverse=nearest") == 2
     assert "NearestNeighbour does not" in capsys.readouterr().err
