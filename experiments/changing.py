@@ -30,7 +30,7 @@ from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.evaluation import evaluate, tile_goals, tile_side
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
-from sgimd_torch.runs.process import command
+from sgimd_torch.runs.signals import command
 from sgimd_torch.runs.tasks import benchmark_of
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Array, stream

@@ -18,7 +18,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any, Final
 
-from sgimd_torch.runs.process import command, loading, say
+from sgimd_torch.runs.signals import command, loading, say
 
 with loading():  # Ctrl-C shows no traceback
     import numpy as np

@@ -19,8 +19,8 @@ from jsonargparse.typing import NonNegativeInt, Path_fc, PositiveInt
 from sgimd_torch.evaluation import SHIPPED
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.parallel import sweep
-from sgimd_torch.runs.process import Failed
 from sgimd_torch.runs.read import read_run
+from sgimd_torch.runs.signals import Failed
 from sgimd_torch.spaces import Array
 from sgimd_torch.views import benchmark
 

@@ -7,8 +7,8 @@ import pytest
 
 from sgimd_torch.record import RunError
 from sgimd_torch.runs import command_line
-from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
+from sgimd_torch.runs.signals import command
 
 MODULE = '''
 import numpy as np

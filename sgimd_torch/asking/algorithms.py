@@ -22,9 +22,8 @@ from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.explore.anywhere import Anywhere
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Correspondence, Learner
-from sgimd_torch.learner.requests import Demonstrator
 from sgimd_torch.memory import Memory
-from sgimd_torch.parts import Problem
+from sgimd_torch.parts import Demonstrator, Problem
 from sgimd_torch.searches.simplex import NelderMead
 from sgimd_torch.strategies import Emulate, GoalBabbling, Mimic
 

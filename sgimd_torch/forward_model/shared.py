@@ -13,6 +13,7 @@ from sgimd_torch.forward_model.listener import ModelListener
 from sgimd_torch.forward_model.model import ForwardModel, Refresh
 from sgimd_torch.memory import Memory
 from sgimd_torch.parts import Inverse, Problem, Trained
+from sgimd_torch.runs.run import RunLoop
 
 
 class SharedModel(Trained):
@@ -30,7 +31,7 @@ class SharedModel(Trained):
         """Result of `ForwardModel.refresh`."""
         return self.model.refresh(memory)
 
-    def listener(self, life: Any) -> ModelListener:
+    def listener(self, life: RunLoop) -> ModelListener:
         """Listener that refreshes the model in a run."""
         learner = life.parts.learner
         asked = partial(is_asked, learner.inverse, self.model)
@@ -49,6 +50,8 @@ class ThroughModel(Inverse):
     Attributes:
         model: forward model.
     """
+
+    says_how_sure = False
 
     @hands_on(model_of)
     def __init__(self, problem: Problem, **options: Any) -> None:

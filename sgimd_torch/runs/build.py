@@ -15,11 +15,8 @@ from sgimd_torch.changes import check_watcher
 from sgimd_torch.environments.protocol import Environment, FromFiles
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.files import checksum
-from sgimd_torch.inverses.among_effects import AmongEffects
-from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Learner
-from sgimd_torch.learner.requests import Demonstrator
-from sgimd_torch.parts import Inverse, Teacher
+from sgimd_torch.parts import Demonstrator, Inverse, Teacher
 from sgimd_torch.runs.at_once import check_at_once
 from sgimd_torch.runs.config import ALGORITHM, OWN, Config
 from sgimd_torch.runs.tasks import Task, benchmark_of
@@ -104,7 +101,7 @@ def build(config: Config) -> RunParts:
     learner = called(algorithm, config.constructor(ALGORITHM), task.environment, config.seed, **shown)
     if not isinstance(learner, Learner):
         raise ValueError(f"{algorithm} must return a Learner, got a {type(learner).__name__}")
-    if config.until is not None and not isinstance(learner.inverse, LocalProcess | AmongEffects):
+    if config.until is not None and not learner.inverse.says_how_sure:
         name = type(learner.inverse).__name__
         raise ValueError(f"--until needs an inverse model that says how sure it is, such as process; {name} does not")
     _answers(config, learner)  # made now, so that their remarks are among the notes

@@ -16,11 +16,11 @@ from typing import Any
 
 from sgimd_torch.catalogue.options import Option, read, wanted
 from sgimd_torch.runs.config import FLAGS, RUN, Config, chosen, dashed
-from sgimd_torch.runs.process import Stopping, loading
+from sgimd_torch.runs.signals import Stopping, loading
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """The command ``sgimd run``; returns 0 when the run has finished, or raises the errors of ``carry_out``."""
+    """The command ``sgimd run``; returns 0 when the run has finished, or raises the errors of ``run_one``."""
     argv = sys.argv[1:] if argv is None else argv
     config, flags = parse(argv, __doc__)
     program = ["sgimd"] if Path(sys.argv[0]).name == "sgimd" else [sys.executable, "-m", "sgimd_torch"]
@@ -28,10 +28,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     with loading():
         from sgimd_torch.runs.build import build  # imported here so that --help is fast
         from sgimd_torch.runs.directory import with_found_earlier
-        from sgimd_torch.runs.run import carry_out
+        from sgimd_torch.runs.run import run_one
     parts = build(with_found_earlier(config))
     with Stopping() as stopping:
-        print(carry_out(parts, stopping, **flags, again=shlex.join(again)))
+        print(run_one(parts, stopping, **flags, again=shlex.join(again)))
     return 0
 
 

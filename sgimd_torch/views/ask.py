@@ -27,7 +27,7 @@ from sgimd_torch.environments.protocol import primitive_of
 from sgimd_torch.files import write_text
 from sgimd_torch.runs.build import RunParts
 from sgimd_torch.runs.load import load_parts
-from sgimd_torch.runs.process import parser_of
+from sgimd_torch.runs.signals import parser_of
 from sgimd_torch.spaces import Array, Box, stream
 
 Answer = dict[str, Array]

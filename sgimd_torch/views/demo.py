@@ -31,8 +31,8 @@ from sgimd_torch.figures.names import label
 from sgimd_torch.runs.command_line import parse
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.parallel import sweep
-from sgimd_torch.runs.process import Failed, loading, parser_of, say
 from sgimd_torch.runs.read import finished, read_run
+from sgimd_torch.runs.signals import Failed, loading, parser_of, say
 
 LEARNERS: Final = {
     "random": "makes random movements",

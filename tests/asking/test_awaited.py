@@ -7,8 +7,8 @@ import pytest
 
 from runs import LIVE, end, stopped
 from sgimd_torch.runs.command_line import main
-from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
+from sgimd_torch.runs.signals import command
 
 STUCK = '''
 import os, signal, threading

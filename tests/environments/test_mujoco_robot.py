@@ -14,8 +14,8 @@ from sgimd_torch.environments.controllers import Sinusoids
 from sgimd_torch.runs.build import build, with_found
 from sgimd_torch.runs.command_line import main, parse
 from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import config_of, finished, read_run
+from sgimd_torch.runs.signals import command
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.teach.leading import Leading
 from sgimd_torch.teach.led import hand_led_of

@@ -18,9 +18,9 @@ from sgimd_torch.runs.build import build
 from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.directory import FILE
-from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.run import Seconds
+from sgimd_torch.runs.signals import command
 from sgimd_torch.spaces import Episode, Move, stream
 
 MOVEMENTS = 170

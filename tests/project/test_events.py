@@ -10,7 +10,7 @@ import pytest
 import sgimd_torch
 
 PACKAGE = Path(sgimd_torch.__path__[0])
-WRITERS = {"learner/__init__.py", "learner/places.py", "record/layout.py"}  # the record reads events from rows
+WRITERS = {"learner/__init__.py", "learner/slots.py", "record/layout.py"}  # the record reads events from rows
 LEARNING = """
 from sgimd_torch import PlanarArm, practice, run
 arm = PlanarArm(7)

@@ -56,7 +56,7 @@ LIBRARIES = {  # rooms or single files that may import a library, by library
     "websockets": {"teach"},
     "jinja2": {"views/report"},
     "docstring_parser": {"catalogue/options"},
-    "tqdm": {"runs/process", "views"},
+    "tqdm": {"runs/signals", "views"},
     "threadpoolctl": {"inverses/gaussian_process"},
     "cma": {"rivals"},
     "sklearn": {"rivals"},

@@ -20,8 +20,8 @@ from sgimd_torch.runs.build import build
 from sgimd_torch.runs.command_line import main, parse
 from sgimd_torch.runs.config import Config, words
 from sgimd_torch.runs.help import overview
-from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
+from sgimd_torch.runs.signals import command
 from sgimd_torch.runs.tasks import MOST_GOALS, goals_all_over
 from sgimd_torch.session import run
 

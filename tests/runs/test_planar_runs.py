@@ -12,8 +12,8 @@ from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.directory import FILE
-from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
+from sgimd_torch.runs.signals import command
 from sgimd_torch.runs.tasks.robots import arm_benchmark, arm_demonstrations
 from sgimd_torch.spaces import stream
 

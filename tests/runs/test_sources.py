@@ -12,8 +12,8 @@ from sgimd_torch.files import checksum
 from sgimd_torch.runs.command_line import main, parse
 from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.directory import sources
-from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import finished
+from sgimd_torch.runs.signals import command
 
 SHORT = (
     "--environment sliders:Slider --algorithm random --movements 40 --evaluate-at 20 --repeats 0 --inverse linear --out"

@@ -20,8 +20,8 @@ from sgimd_torch.record import Record
 from sgimd_torch.runs import command_line
 from sgimd_torch.runs.build import build
 from sgimd_torch.runs.directory import FILE
-from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
+from sgimd_torch.runs.signals import command
 from sgimd_torch.spaces import Box, stream
 from sgimd_torch.views import check
 from sgimd_torch.views.film import command as film

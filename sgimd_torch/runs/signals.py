@@ -92,11 +92,11 @@ def parser_of(name: str, about: str | None, **more: Any) -> argparse.ArgumentPar
     form = argparse.RawDescriptionHelpFormatter
     made = argparse.ArgumentParser(f"sgimd {name}", description=about, formatter_class=form, allow_abbrev=False, **more)
     for word, kind in {int: int, float: float, "numbers": tuple[float, ...]}.items():
-        made.register("type", word, partial(typed, kind=kind))
+        made.register("type", word, partial(parsed, kind=kind))
     return made
 
 
-def typed(text: str, kind: Any) -> Any:
+def parsed(text: str, kind: Any) -> Any:
     """The value that a word of the command line stands for.
 
     Raises:
