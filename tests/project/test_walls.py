@@ -52,6 +52,7 @@ LIBRARIES = {  # rooms or single files that may import a library, by library
     "PIL": {"views/film"},
     "imageio_ffmpeg": {"views/film"},
     "viser": {"teach"},
+    "mink": {"teach"},
     "trimesh": {"teach"},
     "websockets": {"teach"},
     "jinja2": {"views/report"},
