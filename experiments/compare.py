@@ -26,10 +26,10 @@ with loading():  # Ctrl-C shows no traceback
 
     import changing
     import random_robots
-    from sgimd_torch.catalogue import unknown
     from sgimd_torch.files import make_folder
+    from sgimd_torch.options.catalogue import unknown
+    from sgimd_torch.options.config import OWN, Config
     from sgimd_torch.record import RunError
-    from sgimd_torch.runs.config import OWN, Config
     from sgimd_torch.runs.parallel import sweep
     from sgimd_torch.runs.read import finished, read_run
     from sgimd_torch.runs.sweep import add_options

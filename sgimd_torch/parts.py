@@ -16,9 +16,9 @@ from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-from sgimd_torch.catalogue.built import Built
 from sgimd_torch.environments.protocol import Environment, check_robot
 from sgimd_torch.memory import Memory
+from sgimd_torch.options.built import Built
 from sgimd_torch.spaces import Array, AskingAttempt, Attempt, Demonstration, Estimate, stream
 
 Made = TypeVar("Made")

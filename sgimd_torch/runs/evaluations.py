@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from sgimd_torch.evaluation import Evaluation, evaluate, expected_errors, tile_goals, tile_side
+from sgimd_torch.options.build import RunParts
+from sgimd_torch.options.config import OWN
 from sgimd_torch.parts import Inverse
 from sgimd_torch.record import Record
-from sgimd_torch.runs.build import RunParts
-from sgimd_torch.runs.config import OWN
 from sgimd_torch.spaces import Array, stream
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ class Evaluations:
 
     def size(self, movements: int) -> int:
         """Number of movements of the evaluation after this number of ``movements``."""
-        different = len(set(map(id, self.parts.answers.values())))
+        different = len(set(map(id, self.parts.inverses.values())))
         return len(self.parts.benchmark.goals) * (different + self._repeats(movements))
 
     def after(self, movements: int) -> ByInverse | None:
@@ -83,7 +83,7 @@ class Evaluations:
 
         At each goal the noise is the same for all inverse models. The noise floor is measured for the run's own model.
         """
-        inverses, repeats = self.parts.answers, self._repeats(movements)
+        inverses, repeats = self.parts.inverses, self._repeats(movements)
         own, *others = inverses
         parts = self.parts
         judged: tuple[Any, ...] = parts.environment, parts.benchmark.goals, parts.config.seed, movements

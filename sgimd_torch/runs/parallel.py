@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Final
 
 from sgimd_torch.files import make_folder
-from sgimd_torch.runs.config import Config, words
+from sgimd_torch.options.config import Config, words
 from sgimd_torch.runs.read import movements_on_disk
 from sgimd_torch.runs.signals import Failed, Progress, Stopped, Stopping
 

@@ -17,9 +17,9 @@ from typing import Final, Protocol, Self, runtime_checkable
 from sgimd_torch.environments.protocol import FAILURES, SimulationError
 from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.learner.events import Event, Kind
+from sgimd_torch.options.build import RunParts
 from sgimd_torch.record import ReplayError, RunError
 from sgimd_torch.runs.at_once import executing
-from sgimd_torch.runs.build import RunParts
 from sgimd_torch.runs.directory import open_run
 from sgimd_torch.runs.evaluations import Evaluations, ends_now
 from sgimd_torch.runs.signals import Failed, Progress, Stopped, Stopping, say

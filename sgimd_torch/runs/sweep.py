@@ -29,8 +29,8 @@ from pathlib import Path
 from typing import Final, NamedTuple, TypeVar
 
 from sgimd_torch.files import make_folder
-from sgimd_torch.runs.command_line import parse
-from sgimd_torch.runs.config import Config, dashed
+from sgimd_torch.options.command_line import parse
+from sgimd_torch.options.config import Config, dashed
 from sgimd_torch.runs.parallel import sweep
 from sgimd_torch.runs.read import finished, movements_on_disk
 from sgimd_torch.runs.signals import loading, parser_of, say
@@ -82,7 +82,7 @@ def run_all(whole: Sequence[Config], options: argparse.Namespace, flags: Sequenc
     if options.dry_run or not left:
         return 0
     with loading():
-        from sgimd_torch.runs.build import build  # imported here so that --help is fast
+        from sgimd_torch.options.build import build  # imported here so that --help is fast
     for config in {each.directory.parent: each for each in left}.values():
         build(config)  # wrong options raise an error before any run starts
     make_folder(out)

@@ -13,8 +13,8 @@ from typing import Final
 
 import numpy as np
 
-from sgimd_torch.runs.build import build
-from sgimd_torch.runs.config import Config
+from sgimd_torch.options.build import build
+from sgimd_torch.options.config import Config
 from sgimd_torch.runs.directory import FILE, holds_run
 from sgimd_torch.runs.run import RunLoop
 from sgimd_torch.spaces import Array, Demonstration, stream

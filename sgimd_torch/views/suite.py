@@ -24,8 +24,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
-from sgimd_torch.catalogue import ROD
-from sgimd_torch.runs.config import Config
+from sgimd_torch.options.catalogue import ROD
+from sgimd_torch.options.config import Config
 from sgimd_torch.runs.read import finished
 from sgimd_torch.runs.signals import parser_of
 from sgimd_torch.runs.sweep import add_options, add_vary, run_all, variants_of

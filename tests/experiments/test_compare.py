@@ -12,9 +12,9 @@ from made_up import row
 from runs import ROOT, start
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.evaluation import Benchmark
+from sgimd_torch.options.command_line import parse
+from sgimd_torch.options.config import Config, words
 from sgimd_torch.record import RunError
-from sgimd_torch.runs.command_line import parse
-from sgimd_torch.runs.config import Config, words
 from sgimd_torch.runs.parallel import sweep
 from sgimd_torch.runs.read import Run, read_run
 from sgimd_torch.runs.signals import command

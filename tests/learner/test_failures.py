@@ -16,8 +16,8 @@ from sgimd_torch.environments.protocol import Environment, SimulationError
 from sgimd_torch.environments.toys import toss
 from sgimd_torch.evaluation import contexts_of_goals, evaluate
 from sgimd_torch.learner.events import Kind
+from sgimd_torch.options.command_line import main
 from sgimd_torch.record import Record
-from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.signals import command
 from sgimd_torch.session import NoOutcomeError, run

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sgimd_torch.runs.build import build
-from sgimd_torch.runs.config import Config
+from sgimd_torch.options.build import build
+from sgimd_torch.options.config import Config
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.run import RunLoop
 

@@ -8,8 +8,8 @@ import pytest
 from runs import content_of, edit, settle
 from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.options.command_line import main
 from sgimd_torch.record.saving import save_life
-from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.directory import FILE
 from sgimd_torch.runs.load import load_learner
 from sgimd_torch.runs.read import read_run

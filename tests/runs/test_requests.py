@@ -7,9 +7,9 @@ from runs import content_of
 from sgimd_torch.asking.teachers import AnsweringTeacher, mislabelled
 from sgimd_torch.demonstrations import SHIPPED, load_demonstrations
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.runs.build import build, task_of
-from sgimd_torch.runs.command_line import main, parse
-from sgimd_torch.runs.config import Config
+from sgimd_torch.options.build import build, task_of
+from sgimd_torch.options.command_line import main, parse
+from sgimd_torch.options.config import Config
 from sgimd_torch.runs.read import movements_on_disk, read_run
 from sgimd_torch.runs.run import RunLoop
 from sgimd_torch.runs.signals import Stopping, command

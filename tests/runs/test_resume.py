@@ -23,10 +23,10 @@ from runs import (
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.inverses.locally_linear import LocallyLinear
 from sgimd_torch.learner.events import Kind
+from sgimd_torch.options.command_line import main
 from sgimd_torch.record import Record
 from sgimd_torch.runs import evaluations
 from sgimd_torch.runs import run as run_module
-from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.directory import FILE
 from sgimd_torch.runs.read import movements_on_disk, read_run
 from sgimd_torch.runs.signals import command

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from runs import ROOT, arguments, content_of
-from sgimd_torch.catalogue import WORDS
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
+from sgimd_torch.options.build import build
+from sgimd_torch.options.catalogue import WORDS
+from sgimd_torch.options.config import Config
 from sgimd_torch.runs import evaluations
-from sgimd_torch.runs.build import build
-from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.read import config_of, read_run
 from sgimd_torch.runs.run import RunLoop
 from sgimd_torch.runs.signals import Progress, Stopped, Stopping
@@ -43,8 +43,8 @@ def test_what_a_run_learns_with_answers_once_for_both_of_its_names(tmp_path, go)
     assert np.isfinite(found["own"]["noise_floor"]).tolist() == [False, False, True]  # only the last one measures it
     assert np.isnan(found["linear"]["noise_floor"]).all()
     parts = build(config_of(read_run(next(tmp_path.glob("*/seed-003")))))
-    assert parts.answers["linear"] is parts.answers["own"] is parts.learner.inverse
-    assert parts.answers["nearest"] is not parts.answers["own"]
+    assert parts.inverses["linear"] is parts.inverses["own"] is parts.learner.inverse
+    assert parts.inverses["nearest"] is not parts.inverses["own"]
 
 
 def test_a_run_has_the_answers_that_were_asked_for_and_its_movements_do_not_depend_on_them(tmp_path, go, reference):

@@ -5,9 +5,9 @@ import pytest
 
 from runs import about_of, content_of, end, settle, stopped_at
 from sgimd_torch.evaluation import evaluate
-from sgimd_torch.runs.build import build
-from sgimd_torch.runs.command_line import main
-from sgimd_torch.runs.config import Config
+from sgimd_torch.options.build import build
+from sgimd_torch.options.command_line import main
+from sgimd_torch.options.config import Config
 from sgimd_torch.runs.load import load_learner
 from sgimd_torch.runs.read import finished, read_run
 from sgimd_torch.runs.signals import command

@@ -7,7 +7,7 @@ import pytest
 
 from runs import settle
 from sgimd_torch.evaluation import SIDES, load_benchmark, tile_side
-from sgimd_torch.runs.command_line import main as live
+from sgimd_torch.options.command_line import main as live
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.signals import command
 from sgimd_torch.spaces import Box, stream

@@ -14,7 +14,7 @@ from PIL import Image
 
 from pages import Page, rows_of
 from sgimd_torch.figures.learning import COLOURS
-from sgimd_torch.runs.command_line import parse
+from sgimd_torch.options.command_line import parse
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.signals import command
 from sgimd_torch.spaces import Box

@@ -11,7 +11,7 @@ import pytest
 
 from pages import rows_of as table_of
 from sgimd_torch.evaluation import Benchmark, save_benchmark
-from sgimd_torch.runs.command_line import main as live
+from sgimd_torch.options.command_line import main as live
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.signals import command
 from sgimd_torch.views import variants
