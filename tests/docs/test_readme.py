@@ -24,9 +24,9 @@ import pytest
 import sgimd_torch
 from own import MODULE
 from sgimd_torch.__main__ import _call
-from sgimd_torch.catalogue import WORDS
-from sgimd_torch.runs.command_line import parse
-from sgimd_torch.runs.process import command
+from sgimd_torch.options.catalogue import WORDS
+from sgimd_torch.options.command_line import parse
+from sgimd_torch.runs.signals import command
 
 ROOT = Path(__file__).parents[2]
 ALONE = ("README.md", "CONTRIBUTING.md")  # each block by itself
