@@ -235,18 +235,8 @@ def loaded_by(program: str) -> set[str]:
 
 
 HEAVY = {
-    "numba",
-    "torch",
-    "lightning",
-    "pytorch_lightning",
-    "matplotlib",
-    "tensorboardX",
-    "sklearn",
-    "cma",
-    "ribs",
-    "jinja2",
-    "gymnasium",
-    "viser",
+    *{"numba", "torch", "lightning", "pytorch_lightning", "matplotlib", "tensorboardX", "sklearn", "cma", "ribs"},
+    *{"jinja2", "gymnasium", "viser"},
 }
 
 
