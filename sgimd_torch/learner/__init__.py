@@ -34,7 +34,7 @@ class Watcher(Protocol):
     def expect(self, context: Array, theta: Array, outcome: Array) -> None:
         """Compare an outcome, which is not in memory yet, with what is expected."""
 
-    def look(self) -> tuple[Learner, Change | None] | None:
+    def restart_if_changed(self) -> tuple[Learner, Change | None] | None:
         """A learner to go on as, and the change if a new one was noticed; None to go on."""
 
 

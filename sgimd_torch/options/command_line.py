@@ -73,7 +73,7 @@ def _read(argv: Sequence[str]) -> tuple[dict[str, str], set[str]]:
         if word in ("-h", "--help"):
             asked.add("help")
         elif not word.startswith("--"):
-            flags = f"; --{', --'.join(map(dashed, FLAGS))} take no value"
+            flags = f", a flag such as --{dashed(next(iter(FLAGS)))} none"
             raise ValueError(f"{word!r} belongs to no option; an option begins with -- and takes one value{flags}")
         elif name in FLAGS:
             if equals:

@@ -12,8 +12,7 @@ from sgimd_torch.learner.events import Event, Kind
 from sgimd_torch.spaces import Array, Demonstration
 
 DERIVED: Final = ("goals", "evaluations", "errors", "regions", "predictions", "refreshes")  # tables that a replay fills
-SEALS: Final = ["name TEXT", "n_rows INTEGER", "seal INTEGER"]  # columns of the table ``seals``
-HINT: Final = "was it damaged or edited?"  # last part of error messages
+HINT: Final = "was it damaged or edited? sqlite3 run.sqlite .recover saves what can be read"  # end of error messages
 
 Dims = tuple[int, int, int]
 """Dimensions of context, theta and outcome."""
@@ -57,7 +56,7 @@ def layout(dims: Dims) -> dict[str, list[str]]:
         "predictions": ["exemplar INTEGER", *outcome, *predicted],
         "refreshes": ["movements INTEGER", "exemplars INTEGER", "steps INTEGER", *learnt],
     }
-    return {table: [*each, "seal INTEGER"] for table, each in columns.items()}
+    return {table: [*names, "checksum INTEGER"] for table, names in columns.items()}
 
 
 def event_row(event: Event, movement: int, lesson: int | None, dims: Dims) -> Row:

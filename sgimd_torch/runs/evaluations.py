@@ -128,7 +128,7 @@ def _fields(region: Region) -> Iterator[Any]:
 def ends_now(parts: RunParts, record: Record, movements: int) -> bool:
     """Whether the learner expects no larger error than --until says; it looks now and then. The record keeps it."""
     config, learner = parts.config, parts.learner
-    if record.about["met"] is not None:
+    if record.about["ended_early"] is not None:
         return True
     moments = range(0, movements + 1, LOOK_EVERY * max(1, movements // (10 * LOOK_EVERY)))[1:]
     if not (config.due(movements, moments) and len(learner.memory)):
@@ -138,7 +138,7 @@ def ends_now(parts: RunParts, record: Record, movements: int) -> bool:
     expected = expected_error(learner.inverse, goals, stream(config.seed, "until", movements))
     assert config.until is not None
     if expected <= config.until:  # not if it is NaN
-        record.settle(met=[movements, expected])
+        record.about["ended_early"] = [movements, expected]
         return True
     return False
 

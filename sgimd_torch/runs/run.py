@@ -1,6 +1,6 @@
 """One run: replay its record, make new movements, evaluate now and then. Listeners do everything else.
 
-print(run_one(build(Config(seed=3)), stopping, resume=False, accept_loss=False, again="sgimd run --seed 3 --resume"))
+print(run_one(build(Config(seed=3)), stopping, resume=False, again="sgimd run --seed 3 --resume"))
 """
 
 from __future__ import annotations
@@ -30,14 +30,13 @@ TOLD: Final = 3  # first failures, with a message each; later ones are only coun
 COMMIT_EVERY: Final = 1.0  # s between two commits; a killed run loses the movements since the last commit
 
 
-def run_one(parts: RunParts, stopping: Stopping, *, resume: bool, accept_loss: bool, again: str) -> str:
+def run_one(parts: RunParts, stopping: Stopping, *, resume: bool, again: str) -> str:
     """Make a run, or go on with one, and return its result as one line.
 
     Args:
         parts: parts of the run.
         stopping: object that knows whether a signal has come.
         resume: true to go on with the run in the folder.
-        accept_loss: true to go on even if the record has damaged movements.
         again: command that resumes the run, for messages.
 
     Raises:
@@ -45,7 +44,7 @@ def run_one(parts: RunParts, stopping: Stopping, *, resume: bool, accept_loss: b
         Failed: the run failed after its beginning.
         Stopped: a signal stopped the run.
     """
-    with RunLoop(parts, resume=resume, accept_loss=accept_loss) as life:
+    with RunLoop(parts, resume=resume) as life:
         try:
             life.go_on(stopping)
         except Stopped:
@@ -70,7 +69,7 @@ class RunLoop:
     It is a context manager. Leaving it writes the last movements to the disk, except after Ctrl-C.
 
     Args:
-        parts, resume, accept_loss: arguments of ``run_one``.
+        parts, resume: arguments of ``run_one``.
 
     Attributes:
         record: record of the run; new movements are written to it after the replay.
@@ -80,9 +79,9 @@ class RunLoop:
         RunError, OSError: see ``open_run``.
     """
 
-    def __init__(self, parts: RunParts, *, resume: bool, accept_loss: bool = False) -> None:
+    def __init__(self, parts: RunParts, *, resume: bool) -> None:
         self.parts = parts
-        self.record, notes = open_run(parts, resume=resume, accept_loss=accept_loss)
+        self.record, notes = open_run(parts, resume=resume)
         say(*parts.notes, *notes)
         self.movements, self.recorded, self.failed = 0, self.record.movements, 0
         self.seconds = Seconds(self.record.about.get("seconds", {}))
@@ -134,8 +133,8 @@ class RunLoop:
             if last.failed.any():
                 found += f" ({last.failed.sum()} of {len(last.failed)} movements of the evaluation failed)"
         failed = f" ({self.failed} failed)" if self.failed else ""
-        met = self.record.about["met"]
-        early = f", ended early as it expected {self.parts.environment.outcomes.amount(met[1], '.4f')}" if met else ""
+        ended_early, unit = self.record.about["ended_early"], self.parts.environment.outcomes.amount
+        early = f", ended early as it expected {unit(ended_early[1], '.4f')}" if ended_early else ""
         return f"{self.parts.config.directory}: {self.movements} movements{failed}, {found}{early}"
 
     def go_on(self, stopping: Stopping) -> None:
@@ -190,15 +189,15 @@ class RunLoop:
     def commit(self) -> None:
         """Write everything to the disk, unless another program is reading the record: then later."""
         self._committed = time.monotonic()
-        if self._settle():
+        if self._committed_now():
             for each in self.listeners:
                 each.flush()
 
     def _keep(self) -> None:
         """Write the last movements to the disk, as soon as no other program reads the record."""
-        if not self.replaying and not self._settle():
+        if not self.replaying and not self._committed_now():
             say(f"waiting until no other program reads {self.record.path}, to write the last movements")
-            while not self._settle():
+            while not self._committed_now():
                 time.sleep(COMMIT_EVERY)
 
     @property
@@ -227,8 +226,8 @@ class RunLoop:
         """Numbers of the listeners for the board since the last call, by tag."""
         return {tag: value for each in self.listeners for tag, value in each.curves().items()}
 
-    def _settle(self) -> bool:
-        self.record.settle(seconds=self.seconds.summary())
+    def _committed_now(self) -> bool:
+        self.record.about["seconds"] = self.seconds.summary()
         return self.record.commit(wait=False)
 
     def _after(self, episode: Episode) -> None:
