@@ -207,7 +207,7 @@ def _executed(
     execute: Execute, first: int, contexts: Sequence[Array | Failure], moves: Sequence[Move | None]
 ) -> list[Array | Failure | None]:
     """For each robot its outcome, or why it has none; None: it rests. The first robot makes movement ``first``."""
-    outcomes: list[Array | Failure | None] = [each if isinstance(each, Failure) else None for each in contexts]
+    outcomes: list[Array | Failure | None] = [context if isinstance(context, Failure) else None for context in contexts]
     moving = [(first + k, contexts[k], move.theta) for k, move in enumerate(moves) if move is not None]
     if moving:
         for (index, *_), outcome in zip(moving, execute(*zip(*moving, strict=True)), strict=True):
@@ -241,12 +241,12 @@ def _answer(
     if name not in teachers:
         raise ValueError(f"the learner asks {name!r}, but teachers are {', '.join(teachers)}; are they its teachers?")
     try:
-        shown = teachers[name].demonstrate(context.copy(), request.goal, learner.memory)
-        if shown is None:
+        demonstration = teachers[name].demonstrate(context.copy(), request.goal, learner.memory)
+        if demonstration is None:
             return None, "nothing"
-        environment.contexts.check("context of the demonstration", shown.context)
-        environment.outcomes.check("outcome of the demonstration", shown.outcome)
-        return (None, "again") if learner.was_shown(shown) else (shown, "shown")
+        environment.contexts.check("context of the demonstration", demonstration.context)
+        environment.outcomes.check("outcome of the demonstration", demonstration.outcome)
+        return (None, "again") if learner.was_shown(demonstration) else (demonstration, "shown")
     except TimeoutError as error:
         said, reply = f"did not reply in time, so the learner goes on: {error}", "timed out"
     except (Exception, SystemExit) as error:  # no failure of a teacher may end the run
@@ -281,4 +281,4 @@ def _tried_together(
             raise ValueError(f"execute_many() must give {n} outcomes in rows, ({n}, {dim}), got {outcomes.shape}")
     except (Exception, SystemExit) as error:  # no failure of a robot may end the run
         return [Failure(reason_of(error), error)] * n
-    return [_tried("outcome", dim, lambda each=each: each) for each in outcomes]
+    return [_tried("outcome", dim, np.copy, outcome) for outcome in outcomes]

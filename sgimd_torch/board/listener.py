@@ -69,14 +69,14 @@ class BoardListener(EventFile):
             self.add(self._movements, summary.text("about/changes", str(change)))
         self._changes = len(self._learner.changes)
 
-    def evaluated(self, movements: int, found: Mapping[str, Evaluation]) -> None:
+    def evaluated(self, movements: int, evaluations: Mapping[str, Evaluation]) -> None:
         """Show an evaluation; of inverse models other than the run's own, show only the mean error.
 
         Pictures take as long as 100 movements. So they are drawn only when the number of movements has doubled since
         the last pictures, and at the end.
         """
-        own, goals = found["own"], self._benchmark.goals
-        others = {f"error/by_{answer}": each.mean_error for answer, each in found.items() if answer != "own"}
+        own, goals = evaluations["own"], self._benchmark.goals
+        others = {f"error/by_{word}": other.mean_error for word, other in evaluations.items() if word != "own"}
         self._scalars({**of_evaluation(own, self._benchmark.side / 2), **others})
         if movements >= 2 * self._drawn_at or movements == self._config.movements:
             self._drawn_at = movements

@@ -22,6 +22,7 @@ import marshal
 import os
 import sqlite3
 import zlib
+from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
@@ -81,6 +82,8 @@ class Record:
             with self._translated_errors():
                 self._lock() if write else self._copy()
                 self._open()
+                for table in layout(self.dims) if write else ():  # nothing is added to a damaged record
+                    deque(self.rows(table), maxlen=0)
         except BaseException:
             self._connection.close()
             raise

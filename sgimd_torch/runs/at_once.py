@@ -71,8 +71,8 @@ def in_processes(make: Callable[[], Any], seed: int, processes: int) -> Iterator
     try:
         yield execute
     except BaseException:  # after a second Ctrl-C, too, nothing waits for a robot that hangs
-        for each in list(pool._processes.values()):
-            each.kill()
+        for process in list(pool._processes.values()):
+            process.kill()
         raise
     finally:
         pool.shutdown()

@@ -88,8 +88,8 @@ def with_found_earlier(config: Config) -> Config:
     own = {name: value for name, value in config.settings.items() if name.startswith("environment")}
     if any(differ(before.get(name), own[name]) for name in own.keys() - names - {*PLACE}):
         return config  # it is another robot's run
-    found = {name: before[name] for name in names & before.keys() if name not in dict(config.parts)}
-    return Config.from_settings({**config.settings, **found})
+    earlier = {name: before[name] for name in names & before.keys() if name not in dict(config.parts)}
+    return Config.from_settings({**config.settings, **earlier})
 
 
 def _reopened(path: Path, about: dict[str, Any], dims: Dims, config: Config, notes: list[str]) -> Record:
@@ -124,13 +124,13 @@ def _forget_evaluations(
     longer = config.floor_at is None and ended != config.movements
     requested = sorted({*config.evaluations, *(ended_early or [])[:1]})
     kept, left = list[int](), requested
-    for each in made:
-        if anew or not config.due(each, requested) or (longer and each == ended):
+    for movements in made:
+        if anew or not config.due(movements, requested) or (longer and movements == ended):
             continue
-        if not config.due(each, left[:1]):
+        if not config.due(movements, left[:1]):
             break
-        kept.append(each)
-        left = [wanted for wanted in left if wanted > each]
+        kept.append(movements)
+        left = [wanted for wanted in left if wanted > movements]
     if others := [str(movements) for movements in made if movements not in kept]:
         notes.append(f"evaluations after {', '.join(others)} movements are dropped, or repeated if requested")
         for table in EVALUATED:
@@ -170,12 +170,12 @@ def sources(config: Config, robot: Environment) -> dict[str, str]:
     """File and checksum of each part that is the user's own code, such as "toss.py, crc32 8f0a1b2c", and of a model."""
     files = robot.files if isinstance(robot, FromFiles) else ()
     root = os.path.commonpath([path.parent for path in files]) if files else ""
-    found = {f"file {path.relative_to(root)}": f"crc32 {checksum(path)}" for path in files}
+    checksums = {f"file {path.relative_to(root)}": f"crc32 {checksum(path)}" for path in files}
     for word in code_of(config.settings):
         spec = importlib.util.find_spec(word.partition(":")[0])
         if spec is not None and spec.has_location and spec.origin:
-            found[f"source of {word}"] = f"{Path(spec.origin).name}, crc32 {checksum(Path(spec.origin))}"
-    return found
+            checksums[f"source of {word}"] = f"{Path(spec.origin).name}, crc32 {checksum(Path(spec.origin))}"
+    return checksums
 
 
 def versions(*, forward: bool) -> dict[str, Any]:
@@ -186,8 +186,8 @@ def versions(*, forward: bool) -> dict[str, Any]:
     Args:
         forward: whether to include the libraries of a forward model, which other runs do not need.
     """
-    here = str(Path(__file__).parent)
-    describe = ["git", "-C", here, "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"]
+    folder = str(Path(__file__).parent)
+    describe = ["git", "-C", folder, "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"]
     try:
         commit = subprocess.run(describe, capture_output=True, text=True, check=True, timeout=10).stdout.strip()
     except (OSError, subprocess.SubprocessError):

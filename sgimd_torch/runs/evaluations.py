@@ -52,7 +52,7 @@ class Evaluations:
         for movements, word, _, *numbers in self.record.rows("errors"):
             rows.setdefault(movements, {}).setdefault(word, []).append(numbers)
         self._found: dict[int, ByInverse] = {
-            movements: {word: _evaluation(np.array(each, dtype=np.float64)) for word, each in by_word.items()}
+            movements: {word: _evaluation(np.array(numbers, dtype=np.float64)) for word, numbers in by_word.items()}
             for movements, by_word in rows.items()
         }
         self.made = sum(map(self.size, self._found))
@@ -88,26 +88,33 @@ class Evaluations:
         parts = self.parts
         judged: tuple[Any, ...] = parts.environment, parts.benchmark.goals, parts.config.seed, movements
         how: dict[str, Any] = {"between": self.between}
-        found = {own: evaluate(inverses[own], *judged, repeats=repeats, **how)}
+        evaluations = {own: evaluate(inverses[own], *judged, repeats=repeats, **how)}
         for word in others:
             same = inverses[word] is inverses[own]
-            found[word] = found[own].without_noise if same else evaluate(inverses[word], *judged, repeats=0, **how)
-        return found
+            again = evaluations[own].without_noise if same else evaluate(inverses[word], *judged, repeats=0, **how)
+            evaluations[word] = again
+        return evaluations
 
     def _repeats(self, movements: int) -> int:
         config = self.parts.config
         return config.repeats if config.due(movements, config.floors) else 0
 
-    def _write(self, movements: int, found: ByInverse) -> None:
+    def _write(self, movements: int, evaluations: ByInverse) -> None:
         """Add evaluations to the record, and the current regions of the goal model."""
-        for word, each in found.items():
-            errors, met = each.errors, each.met(self.parts.benchmark.side / 2)
+        for word, evaluation in evaluations.items():
+            errors, met = evaluation.errors, evaluation.met(self.parts.benchmark.side / 2)
             quantiles = np.median(errors), np.quantile(errors, 0.9)
-            summary = each.mean_error, *quantiles, each.noise_floor, each.expected.mean(), met
+            summary = evaluation.mean_error, *quantiles, evaluation.noise_floor, evaluation.expected.mean(), met
             self.record.add_rows("evaluations", [(movements, word, *summary)])
-            numbers = errors.tolist(), each.scatter.tolist(), each.failed.astype(int), each.expected.tolist()
-            columns = zip(*numbers, each.contexts, strict=True)
-            rows = [(movements, word, k, *more, *context) for k, (*more, context) in enumerate(columns)]
+            columns = (
+                errors,
+                evaluation.scatter,
+                evaluation.failed.astype(int),
+                evaluation.expected,
+                evaluation.contexts,
+            )
+            numbered = enumerate(zip(*columns, strict=True))
+            rows = [(movements, word, goal, *numbers, *context) for goal, (*numbers, context) in numbered]
             self.record.add_rows("errors", rows)
         self.record.add_rows("regions", [(movements, *_fields(region)) for region in self.parts.learner.regions])
 

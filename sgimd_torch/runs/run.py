@@ -95,7 +95,9 @@ class RunLoop:
 
             board = BoardListener(parts.config.directory, parts, self.seconds.summary, self._curves)
             self.listeners.append(board)
-        self._wanted = {each: self.evaluations.size(each) for each in parts.config.evaluations}  # by movements before
+        self._wanted = {  # number of movements of each evaluation to come, by the number of movements before it
+            movements: self.evaluations.size(movements) for movements in parts.config.evaluations
+        }
         self._committed = time.monotonic()
 
     def __enter__(self) -> Self:
@@ -113,8 +115,8 @@ class RunLoop:
                 self._keep()
         finally:
             self.record.close()
-            for each in self.listeners:
-                each.close()
+            for listener in self.listeners:
+                listener.close()
 
     @property
     def replaying(self) -> bool:
@@ -124,18 +126,18 @@ class RunLoop:
     @property
     def summary(self) -> str:
         """Result of the run, as one line."""
-        last, found = self.evaluations.last, "not evaluated"
+        last, result = self.evaluations.last, "not evaluated"
         if last is not None:
             floor = last.noise_floor
             amount = self.parts.environment.outcomes.amount
             measured = "not measured" if math.isnan(floor) else amount(floor, ".4f")
-            found = f"mean error {amount(last.mean_error, '.4f')}, noise floor {measured}"
+            result = f"mean error {amount(last.mean_error, '.4f')}, noise floor {measured}"
             if last.failed.any():
-                found += f" ({last.failed.sum()} of {len(last.failed)} movements of the evaluation failed)"
+                result += f" ({last.failed.sum()} of {len(last.failed)} movements of the evaluation failed)"
         failed = f" ({self.failed} failed)" if self.failed else ""
         ended_early, unit = self.record.about["ended_early"], self.parts.environment.outcomes.amount
         early = f", ended early as it expected {unit(ended_early[1], '.4f')}" if ended_early else ""
-        return f"{self.parts.config.directory}: {self.movements} movements{failed}, {found}{early}"
+        return f"{self.parts.config.directory}: {self.movements} movements{failed}, {result}{early}"
 
     def go_on(self, stopping: Stopping) -> None:
         """Make all movements, or stop after the movement during which ``stopping`` has heard a signal."""
@@ -190,8 +192,8 @@ class RunLoop:
         """Write everything to the disk, unless another program is reading the record: then later."""
         self._committed = time.monotonic()
         if self._committed_now():
-            for each in self.listeners:
-                each.flush()
+            for listener in self.listeners:
+                listener.flush()
 
     def _keep(self) -> None:
         """Write the last movements to the disk, as soon as no other program reads the record."""
@@ -209,8 +211,8 @@ class RunLoop:
         if self.replaying:
             return 0.0
         seconds, made = self.seconds.summary(), self.evaluations.made
-        each = seconds["seconds_evaluation"] / made if made else seconds["seconds_physics"] / self.movements
-        return each * sum(self._wanted.values())
+        per_movement = seconds["seconds_evaluation"] / made if made else seconds["seconds_physics"] / self.movements
+        return per_movement * sum(self._wanted.values())
 
     def _stop_if(self, stopping: Stopping) -> None:
         """Stop between two movements of the run or of an evaluation, if a signal was heard."""
@@ -224,7 +226,7 @@ class RunLoop:
 
     def _curves(self) -> dict[str, float]:
         """Numbers of the listeners for the board since the last call, by tag."""
-        return {tag: value for each in self.listeners for tag, value in each.curves().items()}
+        return {tag: value for listener in self.listeners for tag, value in listener.curves().items()}
 
     def _committed_now(self) -> bool:
         self.record.about["seconds"] = self.seconds.summary()
@@ -238,8 +240,8 @@ class RunLoop:
             if not replayed and self.failed <= TOLD:
                 more = "; further failures are only counted" if self.failed == TOLD else ""
                 say(f"movement {episode.index} failed: {episode.failed}{more}")
-        for each in self.listeners:
-            each.episode(episode, replayed)
+        for listener in self.listeners:
+            listener.episode(episode, replayed)
         due = [moment for moment in self._wanted if moment <= self.movements]
         if due and self._all_told:
             for moment in due:
@@ -264,18 +266,18 @@ class RunLoop:
 
     def _evaluate(self) -> None:
         with self.seconds.of("evaluation"):
-            found = self.evaluations.after(self.movements)
-        if found is None:
+            evaluations = self.evaluations.after(self.movements)
+        if evaluations is None:
             return
-        for each in self.listeners:
-            each.evaluated(self.movements, found)
+        for listener in self.listeners:
+            listener.evaluated(self.movements, evaluations)
         if not self.replaying:
             self.commit()
 
     def _begin(self) -> None:
         """The replay is over: from now on files change."""
-        for each in self.listeners:
-            each.begin()
+        for listener in self.listeners:
+            listener.begin()
         self.commit()
 
 
@@ -289,8 +291,8 @@ class Listener(Protocol):
         """A movement was made, or replayed."""
         return
 
-    def evaluated(self, movements: int, found: Mapping[str, Evaluation]) -> None:
-        """The learner was evaluated after ``movements`` movements; ``found`` is by name of the inverse model."""
+    def evaluated(self, movements: int, evaluations: Mapping[str, Evaluation]) -> None:
+        """The learner was evaluated after ``movements`` movements; ``evaluations`` are by name of the inverse model."""
         return
 
     def begin(self) -> None:

@@ -239,7 +239,6 @@ def test_a_life_of_another_robot_and_a_damaged_one_are_refused(saved):
     learner = sgim_d(ARM, 6, correspondence=last_posture)
     with pytest.raises(RunError, match=r"life\.sqlite"):
         load_life(learner, saved)
-    assert learner.movements == 0
 
 
 def test_lessons_of_different_shape_are_saved(tmp_path):
