@@ -2,7 +2,6 @@
 
 learner = sgim_acts(environment, seed, correspondence=..., teachers={"ann": ann, "ben": ben}, cost=3)
 learner = sgim_im(environment, seed, correspondence=..., teachers={"ann": ann}, **SEARCHING)     # options of the papers
-learner = sgim_im(environment, seed, correspondence=..., teachers={"ann": ann}, goals=EntropyGoals)
 """
 
 from __future__ import annotations
@@ -13,7 +12,6 @@ from typing import Any, Final
 
 from sgimd_torch.algorithms import MakeInverse
 from sgimd_torch.algorithms.practice import PRACTICE
-from sgimd_torch.asking.entropy import EntropyGoals
 from sgimd_torch.asking.interest import AUTONOMOUS, StrategicInterest
 from sgimd_torch.asking.strategy import Asking, StrategicBabbling
 from sgimd_torch.catalogue.options import hands_on
@@ -92,5 +90,3 @@ sgim_acts_search = partial(sgim_acts, **SEARCHING)
 """SGIM-ACTS, as published: a search at each goal instead of practice."""
 sgim_im_search = partial(sgim_im, **SEARCHING)
 """SGIM-IM, as published: a search at each goal instead of practice."""
-sgim_eer = partial(sgim_im, goals=EntropyGoals)
-"""SGIM-IM; asks when a demonstration should reduce entropy more than the learner's own movement."""
