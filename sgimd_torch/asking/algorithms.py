@@ -17,12 +17,12 @@ from sgimd_torch.asking.strategy import Asking, StrategicBabbling
 from sgimd_torch.catalogue.options import hands_on
 from sgimd_torch.competence import AttemptCompetence
 from sgimd_torch.environments.protocol import Environment
-from sgimd_torch.explore.anywhere import Anywhere
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Correspondence, Learner
 from sgimd_torch.learner.requests import Demonstrator
 from sgimd_torch.memory import Memory
 from sgimd_torch.parts import Problem
+from sgimd_torch.searches.explore import Anywhere
 from sgimd_torch.searches.simplex import NelderMead
 from sgimd_torch.strategies import Emulate, GoalBabbling, Mimic
 

@@ -80,9 +80,9 @@ WORDS: Final[dict[str, dict[str, str]]] = {
         "gradient": "forward_model.search:GradientSearch",
     },
     "explore": {
-        "anywhere": "explore.anywhere:Anywhere",
-        "widening": "explore.widening:Widening",
-        "returning": "explore.returning:Returning",
+        "anywhere": "searches.explore:Anywhere",
+        "widening": "searches.explore:Widening",
+        "returning": "searches.explore:Returning",
     },
     "inverse": {
         "linear": "inverses.locally_linear:LocallyLinear",
