@@ -44,7 +44,7 @@ class SharedModel(Trained):
     def listener(self, life: Any) -> ModelListener:
         """Listener that refreshes the model in a run."""
         learner = life.parts.learner
-        asked = partial(is_asked, learner.inverse, self.model)
+        asked = partial(uses_model, learner.inverse, self.model)
         return ModelListener(life.record, self.model, asked, learner.memory, life.seconds)
 
 
@@ -54,7 +54,7 @@ def model_of(problem: Problem, **options: Any) -> ForwardModel:
     return problem.shared(SharedModel, partial(SharedModel, problem, **options)).model
 
 
-class ThroughModel(Inverse):
+class ModelBased(Inverse):
     """Inverse model that uses the forward model of its problem if the forward model can be trusted.
 
     Attributes:
@@ -72,9 +72,9 @@ class ThroughModel(Inverse):
         return self.model.trusted
 
 
-def is_asked(inverse: Inverse, model: ForwardModel) -> bool:
-    """Whether a learner with this ``inverse`` uses the ``model`` now; a `ThroughModel` has its own ``trusted``."""
-    return inverse.trusted if isinstance(inverse, ThroughModel) else model.trusted
+def uses_model(inverse: Inverse, model: ForwardModel) -> bool:
+    """Whether a learner with this ``inverse`` uses the ``model`` now; a `ModelBased` has its own ``trusted``."""
+    return inverse.trusted if isinstance(inverse, ModelBased) else model.trusted
 
 
 class ModelListener(Listener):
@@ -92,7 +92,7 @@ class ModelListener(Listener):
         self, record: Record, model: ForwardModel, asked: Callable[[], bool], memory: Memory, seconds: Seconds
     ) -> None:
         self._record, self._model, self._memory, self._seconds = record, model, memory, seconds
-        self._is_asked, self._asked = asked, False
+        self._uses_model, self._asked = asked, False
         self._curves: dict[str, float] = {}
 
     def episode(self, episode: Episode, replayed: bool) -> None:
@@ -109,7 +109,7 @@ class ModelListener(Listener):
         if refresh.predicted is not None:
             self._predicted(refresh.first, memory.outcomes[refresh.first :], refresh.predicted)
         news = ["training diverged; the forward model keeps its last good weights"] if refresh.diverged else []
-        asked = self._is_asked()
+        asked = self._uses_model()
         if asked != self._asked:
             self._asked = asked
             who = "the forward model is used from here on" if asked else NOT_ASKED
