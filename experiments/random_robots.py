@@ -34,7 +34,7 @@ from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.learner import Learner
 from sgimd_torch.parts import Inverse
-from sgimd_torch.runs.process import command
+from sgimd_torch.runs.signals import command
 from sgimd_torch.searches.explore import Returning
 from sgimd_torch.searches.perturb import Perturb
 from sgimd_torch.session import run

@@ -13,13 +13,13 @@ from typing import Any, Final
 import numpy as np
 from scipy.special import gammaincinv
 
-from sgimd_torch.catalogue.options import hands_on
 from sgimd_torch.forward_model.model import ForwardModel, Prediction, Refresh
 from sgimd_torch.memory import Memory
+from sgimd_torch.options.signature import with_keywords_of
 from sgimd_torch.parts import Inverse, Problem, Trained
 from sgimd_torch.record import Record
-from sgimd_torch.runs.process import say
-from sgimd_torch.runs.run import Listener, Seconds
+from sgimd_torch.runs.run import Listener, RunLoop, Seconds
+from sgimd_torch.runs.signals import say
 from sgimd_torch.spaces import Array, Episode
 
 LEVEL: Final = 0.8  # share of outcomes that the predicted regions should contain, for the board's model/coverage
@@ -41,14 +41,14 @@ class SharedModel(Trained):
         """Result of `ForwardModel.refresh`."""
         return self.model.refresh(memory)
 
-    def listener(self, life: Any) -> ModelListener:
+    def listener(self, life: RunLoop) -> ModelListener:
         """Listener that refreshes the model in a run."""
         learner = life.parts.learner
         asked = partial(uses_model, learner.inverse, self.model)
         return ModelListener(life.record, self.model, asked, learner.memory, life.seconds)
 
 
-@hands_on(ForwardModel, "members", "rate", "noise_heads", "accelerator", "trust")
+@with_keywords_of(ForwardModel, "members", "rate", "noise_heads", "accelerator", "trust")
 def model_of(problem: Problem, **options: Any) -> ForwardModel:
     """The forward model of a problem; the first call makes it, with these options."""
     return problem.shared(SharedModel, partial(SharedModel, problem, **options)).model
@@ -61,7 +61,9 @@ class ModelBased(Inverse):
         model: forward model.
     """
 
-    @hands_on(model_of)
+    says_how_sure = False
+
+    @with_keywords_of(model_of)
     def __init__(self, problem: Problem, **options: Any) -> None:
         super().__init__(problem)
         self.model = model_of(problem, **options)

@@ -15,14 +15,14 @@ from typing import Any, Final
 import numpy as np
 
 from sgimd_torch.algorithms import MakeInverse
-from sgimd_torch.catalogue.options import hands_on
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Correspondence, Learner
 from sgimd_torch.memory import Memory
+from sgimd_torch.options.signature import with_keywords_of
 from sgimd_torch.parts import Problem, Social, Strategy
 from sgimd_torch.spaces import Array, Attempt, Demonstration, Move, check_count
-from sgimd_torch.strategies import Mimic, watched
+from sgimd_torch.strategies import Mimic, recording_outcomes
 
 try:
     from ribs.archives import GridArchive
@@ -92,7 +92,7 @@ def quality_diversity(
     return Learner(problem, explorer, social=shown, correspondence=correspondence)
 
 
-@hands_on(quality_diversity, *_SHARED)
+@with_keywords_of(quality_diversity, *_SHARED)
 def map_elites(
     environment: Environment,
     seed: int,
@@ -124,7 +124,7 @@ def map_elites(
     return quality_diversity(environment, seed, "map-elites", emitters, **options)
 
 
-@hands_on(quality_diversity, *_SHARED)
+@with_keywords_of(quality_diversity, *_SHARED)
 def isoline(
     environment: Environment,
     seed: int,
@@ -154,7 +154,7 @@ def isoline(
     return quality_diversity(environment, seed, "isoline", emitters, **options)
 
 
-@hands_on(quality_diversity, *_SHARED)
+@with_keywords_of(quality_diversity, *_SHARED)
 def cma_me(
     environment: Environment,
     seed: int,
@@ -181,7 +181,7 @@ def cma_me(
     return quality_diversity(environment, seed, "cma-me", team, **options)
 
 
-@hands_on(quality_diversity, *_SHARED)
+@with_keywords_of(quality_diversity, *_SHARED)
 def cma_mae(
     environment: Environment,
     seed: int,
@@ -327,7 +327,7 @@ class Shown(Social):
         """The movements of the imitation."""
         executed: list[tuple[Array, Array]] = []
         try:
-            yield from watched(self.mimic.attempt(context, theta_d, demonstration), executed)
+            yield from recording_outcomes(self.mimic.attempt(context, theta_d, demonstration), executed)
         finally:  # interruption by the next demonstration included
             if executed:
                 thetas, outcomes = zip(*executed, strict=True)

@@ -9,8 +9,8 @@ import os
 from pathlib import Path
 
 from sgimd_torch.learner import Learner
-from sgimd_torch.record.lives import load_life
-from sgimd_torch.runs.build import RunParts, build
+from sgimd_torch.options.build import RunParts, build
+from sgimd_torch.record.saving import load_life
 from sgimd_torch.runs.directory import FILE
 from sgimd_torch.runs.read import config_of, read_run
 

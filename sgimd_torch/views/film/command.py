@@ -29,11 +29,10 @@ from tqdm import tqdm
 from sgimd_torch.environments.sketch import Sketch
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.figures.names import colour, label
-from sgimd_torch.runs.build import RunParts, build
-from sgimd_torch.runs.process import parser_of, say
+from sgimd_torch.options.build import RunParts, build
 from sgimd_torch.runs.read import Run, config_of, read_run
+from sgimd_torch.runs.signals import parser_of, say
 from sgimd_torch.spaces import Array, stream
-from sgimd_torch.strategies import Remember
 from sgimd_torch.views.film.panel import panel
 from sgimd_torch.views.film.reel import RATES, Painter, Shot, shoot, write_film
 from sgimd_torch.views.film.sketch import Sketchbook
@@ -138,10 +137,10 @@ def _cast(run: Run, parts: RunParts, goals: Array, context: Array, stages: Seque
         past = past[np.isfinite(past[:, 0])]
         title = f"{who}, seed {seed}, after {movements} movements" + f"\n{seen}" * bool(seen)
         for k, goal in enumerate(goals):
-            recording = picture(context, parts.answers["own"](context, goal).theta, stream(seed, "film", k))
+            recording = picture(context, parts.inverses["own"](context, goal).theta, stream(seed, "film", k))
             shots.append(Shot(recording, goal, context, title, robot.outcomes.unit, past))
         found = evaluate(
-            parts.answers["own"], robot, parts.benchmark.goals, seed, movements, context=context, repeats=0
+            parts.inverses["own"], robot, parts.benchmark.goals, seed, movements, context=context, repeats=0
         )
         errors.append(found.errors)
     curve = np.array(stages), np.array([each.mean() for each in errors])
@@ -155,7 +154,9 @@ def _cast(run: Run, parts: RunParts, goals: Array, context: Array, stages: Seque
 def remember(run: Run, parts: RunParts, start: int, stop: int) -> None:
     """Add the exemplars of the movements from ``start`` to ``stop`` to the memory, and train the forward model."""
     memory, correspondence = parts.learner.memory, parts.learner.correspondence
-    by_observation = isinstance(parts.learner.social, Remember)  # only such learners remember demonstrations
+    by_observation = (
+        parts.learner.social is not None and parts.learner.social.remembers
+    )  # only such learners remember demonstrations
     for row in range(start, min(stop, len(run.index))):
         if by_observation and correspondence is not None and run.demonstration[row] >= 0:
             shown = run.demonstrations[run.demonstration[row]]
