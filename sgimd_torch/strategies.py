@@ -267,6 +267,8 @@ class Emulate(Social):
 class Remember(Social):
     """Learn by observation: remember (theta_d, tau_d) like an executed movement, and do not move."""
 
+    remembers = True
+
     def attempt(self, context: Array, theta_d: Array, demonstration: Demonstration) -> Attempt:
         """No movement."""
         self.problem.memory.add(context, theta_d, demonstration.outcome)

@@ -14,7 +14,6 @@ from typing import Any, Final
 
 from sgimd_torch.algorithms import MakeInverse
 from sgimd_torch.algorithms.families import TwoFamilies
-from sgimd_torch.catalogue.options import hands_on
 from sgimd_torch.changes import watched
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.explore.returning import Returning
@@ -23,6 +22,7 @@ from sgimd_torch.goals.within_reach import WithinReach
 from sgimd_torch.inverses.among_effects import AmongEffects
 from sgimd_torch.learner import Correspondence, Learner
 from sgimd_torch.memory import Memory
+from sgimd_torch.options.signature import with_keywords_of
 from sgimd_torch.parts import Problem, Social
 from sgimd_torch.searches.perturb import Vary
 from sgimd_torch.spaces import stream
@@ -39,7 +39,7 @@ PRACTICE: Final[dict[str, Any]] = {
 ONCE: Final = partial(Imitate, repeats=1)
 
 
-@hands_on(GoalBabbling, **PRACTICE)
+@with_keywords_of(GoalBabbling, **PRACTICE)
 def practice(
     environment: Environment,
     seed: int,
@@ -61,7 +61,7 @@ def practice(
     return watched(begin, seed, memory, prior)
 
 
-@hands_on(GoalBabbling, **PRACTICE)
+@with_keywords_of(GoalBabbling, **PRACTICE)
 def practice_taught(
     environment: Environment,
     seed: int,

@@ -16,15 +16,14 @@ from sgimd_torch.algorithms.practice import PRACTICE
 from sgimd_torch.asking.entropy import EntropyGoals
 from sgimd_torch.asking.interest import AUTONOMOUS, StrategicInterest
 from sgimd_torch.asking.strategy import Asking, StrategicBabbling
-from sgimd_torch.catalogue.options import hands_on
 from sgimd_torch.competence import AttemptCompetence
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.explore.anywhere import Anywhere
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Correspondence, Learner
-from sgimd_torch.learner.requests import Demonstrator
 from sgimd_torch.memory import Memory
-from sgimd_torch.parts import Problem
+from sgimd_torch.options.signature import with_keywords_of
+from sgimd_torch.parts import Demonstrator, Problem
 from sgimd_torch.searches.simplex import NelderMead
 from sgimd_torch.strategies import Emulate, GoalBabbling, Mimic
 
@@ -40,7 +39,7 @@ SEARCHING: Final[dict[str, Any]] = {
 """Options of the papers: a search at each goal, imitation with variations, emulation."""
 
 
-@hands_on(GoalBabbling, **STRATEGIC)
+@with_keywords_of(GoalBabbling, **STRATEGIC)
 def sgim_acts(
     environment: Environment,
     seed: int,

@@ -12,10 +12,10 @@ from typing import Any, Final
 import numpy as np
 import torch
 
-from sgimd_torch.catalogue.options import hands_on
 from sgimd_torch.forward_model.anchored import Anchored
 from sgimd_torch.forward_model.shared import ThroughModel
 from sgimd_torch.inverses.locally_linear import LocallyLinear
+from sgimd_torch.options.signature import with_keywords_of
 from sgimd_torch.parts import Problem
 from sgimd_torch.spaces import Array, Estimate
 
@@ -38,7 +38,7 @@ class ModelInverse(ThroughModel):
         problem: problem to learn.
     """
 
-    @hands_on(ThroughModel)
+    @with_keywords_of(ThroughModel)
     def __init__(self, problem: Problem, **options: Any) -> None:
         super().__init__(problem, **options)
         self.start = LocallyLinear(problem)

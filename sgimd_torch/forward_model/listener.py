@@ -15,8 +15,8 @@ from sgimd_torch.forward_model.diagnostics import coverage
 from sgimd_torch.forward_model.model import ForwardModel, Prediction
 from sgimd_torch.memory import Memory
 from sgimd_torch.record import Record
-from sgimd_torch.runs.process import say
 from sgimd_torch.runs.run import Listener, Seconds
+from sgimd_torch.runs.signals import say
 from sgimd_torch.spaces import Array, Episode
 
 LEVEL: Final = 0.8  # share of outcomes that the predicted regions should contain, for the board's model/coverage

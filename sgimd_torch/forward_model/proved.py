@@ -14,11 +14,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from sgimd_torch.catalogue.options import hands_on
 from sgimd_torch.forward_model.inverse import ModelInverse
 from sgimd_torch.forward_model.shared import ThroughModel
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.memory import Memory
+from sgimd_torch.options.signature import with_keywords_of
 from sgimd_torch.parts import Inverse, Problem
 from sgimd_torch.spaces import Array, Estimate
 
@@ -41,7 +41,7 @@ class ProvedModel(ThroughModel):
         problem: problem to learn.
     """
 
-    @hands_on(ThroughModel)
+    @with_keywords_of(ThroughModel)
     def __init__(self, problem: Problem, **options: Any) -> None:
         super().__init__(problem, **options)
         self.process, self.through_model = LocalProcess(problem), ModelInverse(problem)

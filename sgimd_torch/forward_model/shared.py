@@ -8,11 +8,12 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
-from sgimd_torch.catalogue.options import hands_on
 from sgimd_torch.forward_model.listener import ModelListener
 from sgimd_torch.forward_model.model import ForwardModel, Refresh
 from sgimd_torch.memory import Memory
+from sgimd_torch.options.signature import with_keywords_of
 from sgimd_torch.parts import Inverse, Problem, Trained
+from sgimd_torch.runs.run import RunLoop
 
 
 class SharedModel(Trained):
@@ -30,14 +31,14 @@ class SharedModel(Trained):
         """Result of `ForwardModel.refresh`."""
         return self.model.refresh(memory)
 
-    def listener(self, life: Any) -> ModelListener:
+    def listener(self, life: RunLoop) -> ModelListener:
         """Listener that refreshes the model in a run."""
         learner = life.parts.learner
         asked = partial(is_asked, learner.inverse, self.model)
         return ModelListener(life.record, self.model, asked, learner.memory, life.seconds)
 
 
-@hands_on(ForwardModel, "members", "rate", "noise_heads", "accelerator", "trust")
+@with_keywords_of(ForwardModel, "members", "rate", "noise_heads", "accelerator", "trust")
 def model_of(problem: Problem, **options: Any) -> ForwardModel:
     """The forward model of a problem; the first call makes it, with these options."""
     return problem.shared(SharedModel, partial(SharedModel, problem, **options)).model
@@ -50,7 +51,9 @@ class ThroughModel(Inverse):
         model: forward model.
     """
 
-    @hands_on(model_of)
+    says_how_sure = False
+
+    @with_keywords_of(model_of)
     def __init__(self, problem: Problem, **options: Any) -> None:
         super().__init__(problem)
         self.model = model_of(problem, **options)

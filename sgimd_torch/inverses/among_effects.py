@@ -47,3 +47,9 @@ class AmongEffects(Inverse):
     def effects(self) -> Memory | None:
         """Exemplars with an effect, see `Effects`."""
         return self._effects()
+
+
+def process_of(inverse: Inverse) -> LocalProcess:
+    """A local process of all exemplars, to predict any movement: that of the inverse model, or a new one."""
+    own = inverse.of_all if isinstance(inverse, AmongEffects) else inverse
+    return own if isinstance(own, LocalProcess) else LocalProcess(inverse.problem)

@@ -15,11 +15,11 @@ from typing import Any, Final
 import numpy as np
 
 from sgimd_torch.algorithms import MakeInverse
-from sgimd_torch.catalogue.options import hands_on
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Correspondence, Learner
 from sgimd_torch.memory import Memory
+from sgimd_torch.options.signature import with_keywords_of
 from sgimd_torch.parts import Problem
 from sgimd_torch.rivals.explorer import QualityDiversity, Shown
 from sgimd_torch.spaces import check_count
@@ -93,7 +93,7 @@ def quality_diversity(
     return Learner(problem, explorer, social=shown, correspondence=correspondence)
 
 
-@hands_on(quality_diversity, *_SHARED)
+@with_keywords_of(quality_diversity, *_SHARED)
 def map_elites(
     environment: Environment,
     seed: int,
@@ -125,7 +125,7 @@ def map_elites(
     return quality_diversity(environment, seed, "map-elites", emitters, **options)
 
 
-@hands_on(quality_diversity, *_SHARED)
+@with_keywords_of(quality_diversity, *_SHARED)
 def isoline(
     environment: Environment,
     seed: int,
@@ -155,7 +155,7 @@ def isoline(
     return quality_diversity(environment, seed, "isoline", emitters, **options)
 
 
-@hands_on(quality_diversity, *_SHARED)
+@with_keywords_of(quality_diversity, *_SHARED)
 def cma_me(
     environment: Environment,
     seed: int,
@@ -182,7 +182,7 @@ def cma_me(
     return quality_diversity(environment, seed, "cma-me", team, **options)
 
 
-@hands_on(quality_diversity, *_SHARED)
+@with_keywords_of(quality_diversity, *_SHARED)
 def cma_mae(
     environment: Environment,
     seed: int,

@@ -11,8 +11,8 @@ import os
 from pathlib import Path
 
 from sgimd_torch.learner import Learner
-from sgimd_torch.record.lives import repeated
-from sgimd_torch.runs.build import build
+from sgimd_torch.options.build import build
+from sgimd_torch.record.saving import repeated
 from sgimd_torch.runs.directory import FILE
 from sgimd_torch.runs.read import config_of, read_run
 

@@ -13,10 +13,10 @@ from typing import Final
 
 import numpy as np
 
-from sgimd_torch.runs.build import build
-from sgimd_torch.runs.config import Config
+from sgimd_torch.options.build import build
+from sgimd_torch.options.config import Config
 from sgimd_torch.runs.directory import FILE, holds_run
-from sgimd_torch.runs.run import Life
+from sgimd_torch.runs.run import RunLoop
 from sgimd_torch.spaces import Array, Demonstration, stream
 from sgimd_torch.teach.by_hand import BY_HAND, ByHand
 from sgimd_torch.teach.chart import Chart, chart_of
@@ -75,7 +75,7 @@ class TaughtRun:
             raise ValueError(ALONE.format(config.algorithm))
         self._hand = ByHand(teacher=parts.teacher)
         self.parts = replace(parts, teacher=self._hand)
-        self._life = Life(self.parts, resume=holds_run(config.directory / FILE))
+        self._life = RunLoop(self.parts, resume=holds_run(config.directory / FILE))
         self._episodes = self._life.episodes()
         self._lessons = sum(each.kind == "shown" and each.who == BY_HAND for each in self._life.record.events())
         self._landed: deque[Array] = deque(maxlen=LATEST)

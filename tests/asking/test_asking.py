@@ -10,10 +10,9 @@ from sgimd_torch.algorithms.paper import sagg_riac
 from sgimd_torch.asking.algorithms import SEARCHING, sgim_acts, sgim_eer, sgim_im
 from sgimd_torch.asking.teachers import AnsweringTeacher, high_half, low_half, mislabelled
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.learner.requests import Demonstrator
-from sgimd_torch.parts import Strategy
+from sgimd_torch.parts import Demonstrator, Strategy
 from sgimd_torch.record import ReplayError
-from sgimd_torch.record.lives import load_life, save_life
+from sgimd_torch.record.saving import load_life, save_life
 from sgimd_torch.runs.tasks.robots import arm_demonstrations
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Demonstration, Lesson, Request, stream

@@ -17,13 +17,13 @@ def read(name):
     return nbformat.read(FOLDER / f"{name}.ipynb", as_version=4)
 
 
-@pytest.mark.parametrize("name", [pytest.param(each, marks=[pytest.mark.slow] * (each in SLOW)) for each in NAMES])
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name in SLOW)) for name in NAMES])
 def test_a_notebook_works_from_top_to_bottom(name, tmp_path):
     notebook = read(name)
-    shown = [kinds(cell) for cell in codes(notebook)]
+    stored = [kinds(cell) for cell in codes(notebook)]
     # A cell that raises ends it with CellExecutionError.
     NotebookClient(notebook, timeout=900, kernel_name="python3", resources={"metadata": {"path": tmp_path}}).execute()
-    assert [kinds(cell) for cell in codes(notebook)] == shown  # printed text and pictures in the same places
+    assert [kinds(cell) for cell in codes(notebook)] == stored  # printed text and pictures in the same places
 
 
 def codes(notebook):
@@ -32,7 +32,7 @@ def codes(notebook):
 
 def kinds(cell):
     """What a cell has shown: "stdout", "stderr", or the kinds of data of a picture."""
-    return {each.get("name") or ",".join(sorted(each.data)) for each in cell.outputs}
+    return {output.get("name") or ",".join(sorted(output.data)) for output in cell.outputs}
 
 
 @pytest.mark.parametrize("name", NAMES)

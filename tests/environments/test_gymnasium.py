@@ -15,8 +15,8 @@ from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.protocol import SimulationError
 from sgimd_torch.environments.swimmer import Swimmer
 from sgimd_torch.environments.to_gymnasium import ToGymnasium
-from sgimd_torch.runs.build import task_of
-from sgimd_torch.runs.config import Config
+from sgimd_torch.options.build import task_of
+from sgimd_torch.options.config import Config
 from sgimd_torch.runs.tasks import benchmark_of
 from sgimd_torch.runs.tasks.taught import demonstrations_of
 from sgimd_torch.session import run

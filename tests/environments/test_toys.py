@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from sgimd_torch.catalogue import WORDS
 from sgimd_torch.environments.check import check_environment
 from sgimd_torch.environments.objects import fetch, puck
 from sgimd_torch.environments.toys import GRAVITY, Toy, crawler, spatial_arm, toss, two_elbows
-from sgimd_torch.runs.build import task_of
-from sgimd_torch.runs.config import Config
+from sgimd_torch.options.build import task_of
+from sgimd_torch.options.catalogue import WORDS
+from sgimd_torch.options.config import Config
 from sgimd_torch.runs.tasks import benchmark_of
 from sgimd_torch.spaces import stream
 

@@ -8,7 +8,6 @@ import torch
 
 from models import ARM, boxes, problem_of
 from sgimd_torch.algorithms.paper import sagg_riac
-from sgimd_torch.catalogue.options import help_of, options_of
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.forward_model import inverse as module
 from sgimd_torch.forward_model.inverse import ModelAlone, ModelInverse
@@ -17,6 +16,7 @@ from sgimd_torch.forward_model.proved import ProvedModel
 from sgimd_torch.forward_model.shared import is_asked, model_of
 from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.memory import Memory
+from sgimd_torch.options.signature import help_of, options_of
 from sgimd_torch.parts import Problem
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Box, stream

@@ -40,7 +40,7 @@ def make():
     return Task(Arm(), lambda: Benchmark("Arm", np.array([[0.5, 0.5], [-0.3, 0.2]]), 0.1))
 """
 ODD = ["--environment", "odd:make", "--algorithm", "random", "--movements", "40", "--evaluate-at", "[]"]
-SWEEP = "import sys; from sgimd_torch.runs import process, sweep; sys.exit(process.command(sweep.main))"
+SWEEP = "import sys; from sgimd_torch.runs import signals, sweep; sys.exit(signals.command(sweep.main))"
 
 
 def odd_place(place):

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from sgimd_torch.algorithms.paper import imitation, observation, random_exploration, sagg_riac, sgim_d
-from sgimd_torch.catalogue import load_word
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
+from sgimd_torch.options.catalogue import load_word
 from sgimd_torch.parts import Inverse, Problem, Search
 from sgimd_torch.spaces import Array, Box, Demonstration, Estimate, stream
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import docstring_parser
 import pytest
 
-from sgimd_torch.catalogue import WORDS, about
+from sgimd_torch.options.catalogue import WORDS, about
 
 ROOT = Path(__file__).parents[2]
 # First words of a description that only continues the name before it; _ stands for a space.

@@ -20,23 +20,27 @@ PINNED = dict(
 )
 
 
-def required(*names):
+NAME = PROJECT["project"]["name"]
+BUILD = [Requirement(text) for text in PROJECT["build-system"]["requires"]]
+
+
+def required(*extras):
     """Requirements of the project with some of its extras; an extra that contains other extras is resolved."""
-    lists = [PROJECT["project"]["dependencies"], *(EXTRAS[name] for name in names)]
-    requirements = [Requirement(text) for each in lists for text in each]
-    again = {extra for each in requirements if each.name == PROJECT["project"]["name"] for extra in each.extras}
-    if again - {*names}:
-        return required(*{*names, *again})
-    return [each for each in requirements if each.name != PROJECT["project"]["name"]]
+    lists = [PROJECT["project"]["dependencies"], *(EXTRAS[extra] for extra in extras)]
+    requirements = [Requirement(text) for texts in lists for text in texts]
+    contained = {extra for requirement in requirements if requirement.name == NAME for extra in requirement.extras}
+    if contained - {*extras}:
+        return required(*{*extras, *contained})
+    return [requirement for requirement in requirements if requirement.name != NAME]
 
 
 def closure(requirements):
     """Names of all packages that these requirements install on this system, directly or indirectly."""
-    wanted = [(each, extra) for each in requirements for extra in (each.extras or {""}) | {""}]
+    wanted = [(requirement, extra) for requirement in requirements for extra in requirement.extras | {""}]
     done = set()
     while wanted:
-        each, extra = wanted.pop()
-        name = canonicalize_name(each.name)
+        requirement, extra = wanted.pop()
+        name = canonicalize_name(requirement.name)
         if (name, extra) in done:
             continue
         done.add((name, extra))
@@ -48,9 +52,7 @@ def closure(requirements):
 
 
 def test_everything_that_setup_installs_is_pinned_and_nothing_else():
-    build = [Requirement(text) for text in PROJECT["build-system"]["requires"]]
-    names = closure([*required("all", "dev"), *build])
-    assert names == {canonicalize_name(name) for name in PINNED}
+    assert closure([*required("all", "dev"), *BUILD]) == {canonicalize_name(name) for name in PINNED}
 
 
 def test_what_is_installed_has_the_pinned_versions():
@@ -59,8 +61,8 @@ def test_what_is_installed_has_the_pinned_versions():
 
 
 def test_every_requirement_says_its_lowest_version():
-    for each in [*required("all", "dev"), *(Requirement(text) for text in PROJECT["build-system"]["requires"])]:
-        assert len([part for part in each.specifier if part.operator == ">="]) == 1, each
+    for requirement in [*required("all", "dev"), *BUILD]:
+        assert [part.operator for part in requirement.specifier].count(">=") == 1, requirement
 
 
 ABSENT = """import importlib.abc, sys
@@ -100,8 +102,8 @@ def lowest(requirement):
 @pytest.mark.slow
 def test_the_lowest_versions_allowed_install_together_and_pass(tmp_path):
     # About 3 GB to download, as the lowest torch comes with its libraries for GPUs. Linters are not tested.
-    wanted = [*required("all", "dev"), *(Requirement(text) for text in PROJECT["build-system"]["requires"])]
-    pins = [lowest(each) for each in wanted if each.name not in ("mypy", "ruff", "pytest-xdist")]
+    wanted = [*required("all", "dev"), *BUILD]
+    pins = [lowest(requirement) for requirement in wanted if requirement.name not in ("mypy", "ruff", "pytest-xdist")]
     python = str(tmp_path / "venv/bin/python")
     subprocess.run([sys.executable, "-m", "venv", str(tmp_path / "venv")], check=True)
     install = [python, "-m", "pip", "install", "-q", "--disable-pip-version-check", "--no-cache-dir", *pins]

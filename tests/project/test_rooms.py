@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from sgimd_torch.catalogue import WORDS
+from sgimd_torch.options.catalogue import WORDS
 
 ROOT = Path(__file__).parents[2]
 ROOMS = ("forward_model", "asking", "teach", "rivals")
@@ -28,7 +28,7 @@ def without(room, folder):
     for name in ("scripts/documentation", "experiments"):
         (folder / name).mkdir(parents=True)
     shutil.rmtree(folder / "sgimd_torch" / room)
-    table = folder / "sgimd_torch/catalogue/__init__.py"
+    table = folder / "sgimd_torch/options/catalogue.py"
     lines = table.read_text().splitlines(keepends=True)
     kept = [line for line in lines if f'": "{room}.' not in line]
     table.write_text("".join(kept))

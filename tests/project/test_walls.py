@@ -14,7 +14,7 @@ import sgimd_torch
 
 PACKAGE = "sgimd_torch"
 ROWS = [  # a room imports only from rows above its own
-    {"spaces", "files", "catalogue"},
+    {"spaces", "files", "options"},
     {"memory", "environments"},
     {"parts", "demonstrations"},
     {"competence", "teachers", "evaluation", "goals", "explore", "figures"},
@@ -29,6 +29,7 @@ ROWS = [  # a room imports only from rows above its own
     {"__main__"},
 ]
 ROW = {room: row for row, rooms in enumerate(ROWS) for room in rooms}
+UPSTAIRS = dict.fromkeys(("options/build", "options/command_line"), "runs")  # files of another room than their folder
 LIBRARIES = {  # rooms or single files that may import a library, by library
     "numpy": ROW.keys(),
     "scipy": ROW.keys() - {"spaces"},
@@ -51,11 +52,12 @@ LIBRARIES = {  # rooms or single files that may import a library, by library
     "PIL": {"views/film"},
     "imageio_ffmpeg": {"views/film"},
     "viser": {"teach"},
+    "mink": {"teach"},
     "trimesh": {"teach"},
     "websockets": {"teach"},
     "jinja2": {"views/report"},
-    "docstring_parser": {"catalogue/options"},
-    "tqdm": {"runs/process", "views"},
+    "docstring_parser": {"options/signature"},
+    "tqdm": {"runs/signals", "views"},
     "threadpoolctl": {"inverses/gaussian_process"},
     "cma": {"rivals"},
     "sklearn": {"rivals"},
@@ -82,16 +84,21 @@ def imports(source: str):
             yield from (f"{home}.{alias.name}" for alias in node.names)
 
 
+def room_of(place: str) -> str:
+    """Room of a file, such as "goals" of "goals/regions"."""
+    return UPSTAIRS.get(place, place.partition("/")[0])
+
+
 def breach(place: str, name: str) -> str | None:
     """Message if a file at ``place``, such as "goals/regions", may not import a dotted name; None if it may."""
-    room, (top, *rest) = place.partition("/")[0], name.split(".")
+    room, (top, *rest) = room_of(place), name.split(".")
     if top != PACKAGE:
         allowed = LIBRARIES.get(top, ())
         here = any(place == each or place.startswith(f"{each}/") for each in allowed)
         return (
             None if here or top in sys.stdlib_module_names else f"{place} imports {name}, allowed in {sorted(allowed)}"
         )
-    target = rest[0] if rest and rest[0] in ROW else "__init__"
+    target = room_of("/".join(rest[:2])) if rest and rest[0] in ROW else "__init__"
     if target == "__init__":
         return None if rest[:1] == ["__version__"] or not rest else f"{place} imports {name} from the package"
     if target != room and ROW[target] >= ROW[room]:
@@ -109,7 +116,7 @@ def breaches(package: Path) -> list[str]:
     found = []
     for path in sorted(package.rglob("*.py")):
         place = path.relative_to(package).with_suffix("").as_posix()
-        room = place.partition("/")[0]
+        room = room_of(place)
         if room not in ROW and place != "__init__":
             found.append(f"{place} has no row yet: give it one in {Path(__file__).name}")
             continue
@@ -228,18 +235,8 @@ def loaded_by(program: str) -> set[str]:
 
 
 HEAVY = {
-    "numba",
-    "torch",
-    "lightning",
-    "pytorch_lightning",
-    "matplotlib",
-    "tensorboardX",
-    "sklearn",
-    "cma",
-    "ribs",
-    "jinja2",
-    "gymnasium",
-    "viser",
+    *{"numba", "torch", "lightning", "pytorch_lightning", "matplotlib", "tensorboardX", "sklearn", "cma", "ribs"},
+    *{"jinja2", "gymnasium", "viser"},
 }
 
 

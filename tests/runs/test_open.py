@@ -16,14 +16,13 @@ import pytest
 from boards import curves_of
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import Benchmark, save_benchmark
-from sgimd_torch.record.lives import save_life
-from sgimd_torch.runs.build import build
-from sgimd_torch.runs.command_line import parse
-from sgimd_torch.runs.directory import FILE
+from sgimd_torch.options.build import build
+from sgimd_torch.options.command_line import parse
+from sgimd_torch.record.saving import save_life
 from sgimd_torch.runs.load import load_learner
-from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.runs.run import Life
+from sgimd_torch.runs.run import RunLoop
+from sgimd_torch.runs.signals import command
 from sgimd_torch.spaces import stream
 from sgimd_torch.teach.command import options_of
 from sgimd_torch.teach.taught import ALONE, TaughtRun
@@ -71,6 +70,7 @@ MODEL = """<mujoco><default><joint damping="1"/></default><option integrator="im
   <actuator><position joint="shoulder" kp="60" kv="6"/><position joint="elbow" kp="60" kv="6"/></actuator></mujoco>"""
 ARM = "--environment planar-arm-7 --benchmark {files}/goals.npz"
 FROM_FILE = "--environment mujoco --environment.model {files}/arm.xml --environment.outcome site:tip:xy"
+FROM_FILE += " --environment.low -1,-1 --environment.high 1,1 --benchmark {files}/model.npz"
 KINDS = {
     "plain": f"{ARM} --algorithm practice",
     "taught": f"{ARM} --algorithm sgim-d --teacher.every 7",
@@ -81,7 +81,7 @@ KINDS = {
     "noticed change": "--environment opened:slipping --algorithm practice --movements 220",
     "several robots": f"{ARM} --algorithm practice-taught --at-once 4",
     "forward model": f"{ARM} --algorithm sagg-riac --inverse model --inverse.rate 1 --movements 70",
-    "model file": f"{FROM_FILE} --benchmark {{files}}/model.npz --environment.low -1,-1 --environment.high 1,1 --algorithm random",
+    "model file": f"{FROM_FILE} --algorithm random",
 }
 LED = {"taught", "several robots"}  # kinds of runs that sgimd teach can go on with
 
@@ -132,7 +132,7 @@ def lived(files, tmp_path_factory):
             )
             config, _ = parse(f"{short} {KINDS[kind]}".format(files=files).split())
             parts, early = build(config), None
-            with Life(parts, resume=False) as life:
+            with RunLoop(parts, resume=False) as life:
                 for _ in life.episodes():
                     n = parts.learner.movements
                     if early is None and n >= EARLY and life.movements == n:
@@ -203,7 +203,7 @@ def test_teaching_goes_on_with_the_learner_that_lived_or_says_that_it_learns_alo
 
 def test_a_resumed_run_has_the_learner_that_lived_and_the_board_its_errors(run):
     parts = build(replace(run.parts.config, board=True))
-    with Life(parts, resume=True) as life:
+    with RunLoop(parts, resume=True) as life:
         for _ in life.episodes():
             pass
         life.commit()

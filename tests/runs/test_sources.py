@@ -9,11 +9,11 @@ import pytest
 from runs import ROOT, about_of, content_of
 from sgimd_torch import PlanarArm
 from sgimd_torch.files import checksum
-from sgimd_torch.runs.command_line import main, parse
-from sgimd_torch.runs.config import Config
+from sgimd_torch.options.command_line import main, parse
+from sgimd_torch.options.config import Config
 from sgimd_torch.runs.directory import sources
-from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import finished
+from sgimd_torch.runs.signals import command
 
 SHORT = (
     "--environment sliders:Slider --algorithm random --movements 40 --evaluate-at 20 --repeats 0 --inverse linear --out"

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.runs.command_line import main as run
-from sgimd_torch.runs.config import Config, words
-from sgimd_torch.runs.process import command
+from sgimd_torch.options.command_line import main as run
+from sgimd_torch.options.config import Config, words
 from sgimd_torch.runs.read import read_run
+from sgimd_torch.runs.signals import command
 from sgimd_torch.runs.tasks.robots import arm_demonstrations
 from sgimd_torch.teach.by_hand import BY_HAND, ByHand
 from sgimd_torch.teach.command import main, options_of

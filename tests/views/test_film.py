@@ -16,12 +16,12 @@ from sgimd_torch.environments.mujoco_robot import MujocoRobot
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.sketch import Sketch
 from sgimd_torch.evaluation import evaluate
+from sgimd_torch.options import command_line
+from sgimd_torch.options.build import build
 from sgimd_torch.record import Record
-from sgimd_torch.runs import command_line
-from sgimd_torch.runs.build import build
 from sgimd_torch.runs.directory import FILE
-from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
+from sgimd_torch.runs.signals import command
 from sgimd_torch.spaces import Box, stream
 from sgimd_torch.views import check
 from sgimd_torch.views.film import command as film
@@ -176,7 +176,7 @@ def test_the_memory_rebuilt_from_the_log_judges_as_the_living_one_did(tmp_path, 
     assert (run.demonstration[:35] >= 0).any()
     film.remember(run, parts, 0, 20)
     film.remember(run, parts, 20, 35)  # in two steps, as a film of several stages does
-    seen = evaluate(parts.answers["own"], parts.environment, parts.benchmark.goals, 3, 35, repeats=0)
+    seen = evaluate(parts.inverses["own"], parts.environment, parts.benchmark.goals, 3, 35, repeats=0)
     assert seen.mean_error == run.evaluation["mean_error"][0]
 
 
@@ -429,7 +429,7 @@ def test_what_has_no_picture_is_refused_in_a_line(own, capsys, word, message):
 
 def test_code_that_somebody_elses_run_names_is_executed_only_with_trust(own, capsys, monkeypatch):
     live("--environment sliders:Slider --algorithm random --movements 20 --evaluate-at [] --out runs --name one")
-    monkeypatch.setattr("sgimd_torch.runs.config.load_word", lambda *_: pytest.fail("it was imported"))
+    monkeypatch.setattr("sgimd_torch.options.config.load_word", lambda *_: pytest.fail("it was imported"))
     assert command(film.main, ["runs/one/seed-000"]) == 2
     assert (
         "names code outside this library, sliders:Slider; read it, then execute it with --trust"

@@ -2,11 +2,11 @@
 
 import pytest
 
-from sgimd_torch.catalogue import WORDS
-from sgimd_torch.runs.build import task_of
-from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.process import command
+from sgimd_torch.options.build import task_of
+from sgimd_torch.options.catalogue import WORDS
+from sgimd_torch.options.config import Config
 from sgimd_torch.runs.read import read_run
+from sgimd_torch.runs.signals import command
 from sgimd_torch.runs.tasks import goals_all_over
 from sgimd_torch.views.suite import RANDOM, TASKS, UNIFORM, _options, main, runs_of
 

@@ -30,8 +30,8 @@ from sgimd_torch.environments.sketch import Sketch
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.figures.names import colour, label
 from sgimd_torch.runs.load import OpenRun
-from sgimd_torch.runs.process import parser_of, say
 from sgimd_torch.runs.read import Run
+from sgimd_torch.runs.signals import parser_of, say
 from sgimd_torch.spaces import Array, stream
 from sgimd_torch.views.film.panel import panel
 from sgimd_torch.views.film.reel import RATES, Painter, Shot, shoot, write_film

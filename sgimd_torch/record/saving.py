@@ -12,7 +12,6 @@ from sgimd_torch.parts import Teacher
 from sgimd_torch.record import Record, ReplayError, RunError
 from sgimd_torch.record.replay import replay
 from sgimd_torch.spaces import Episode, Move
-from sgimd_torch.strategies import Remember
 
 
 def save_life(learner: Learner, path: str | os.PathLike[str]) -> None:
@@ -24,7 +23,7 @@ def save_life(learner: Learner, path: str | os.PathLike[str]) -> None:
         ValueError: exemplars entered the memory without `Learner.add`, so no learner could repeat this life.
         OSError: ``path`` is a directory, or cannot be written.
     """
-    counted = {Kind.MOVED, Kind.ADDED, *([Kind.SHOWN] if isinstance(learner.social, Remember) else [])}
+    counted = {Kind.MOVED, Kind.ADDED, *([Kind.SHOWN] if learner.social and learner.social.remembers else [])}
     lived = learner.begun + sum(event.kind in counted for event in learner.events())
     if len(learner.memory) != lived:
         raise ValueError(

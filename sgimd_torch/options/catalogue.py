@@ -3,7 +3,7 @@
     load_word("goals", "grid")                    # ProgressGrid, which is imported now
     load_word("goals", "mypackage.goals:Curious") # a class of your own
 To remove a feature, delete its folder and its lines of this table. The help text of a name is the first line of the
-docstring at its place. The options are keywords of the signature there (`sgimd_torch.catalogue.options`).
+docstring at its place. The options are keywords of the signature there (`sgimd_torch.options.signature`).
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ WORDS: Final[dict[str, dict[str, str]]] = {
         "slow": "asking.teachers:slow",
     },
     "command": {
-        "run": "runs.command_line",
+        "run": "options.command_line",
         "sweep": "runs.sweep",
         "check": "views.check",
         "demonstrations": "views.demonstrations",
@@ -229,7 +229,7 @@ def function_of(made: Callable[..., Any]) -> Callable[..., Any]:
     return function_of(made.func) if isinstance(made, partial) else made
 
 
-def called(what: str, make: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
+def call_checked(what: str, make: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
     """Result of a call of ``make``, which may be code of a user.
 
     Raises:
