@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from sgimd_torch.competence import Competence
-from sgimd_torch.explore.anywhere import Anywhere
 from sgimd_torch.parts import Explore, Goals, Judge, Part, Problem, Search, Social, Strategy
+from sgimd_torch.searches.explore import Anywhere
 from sgimd_torch.spaces import Array, Attempt, Demonstration, Move, check_count
 
 
@@ -275,7 +275,7 @@ class Remember(Social):
         yield from ()  # makes this a generator
 
 
-def watched(attempt: Attempt, executed: list[tuple[Array, Array]]) -> Attempt:
+def recording_outcomes(attempt: Attempt, executed: list[tuple[Array, Array]]) -> Attempt:
     """The movements of ``attempt``; each theta is appended to ``executed`` with its outcome.
 
     The memory may have outcomes of other robots in between.

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from typing import Any
 
 from sgimd_torch.algorithms import MakeInverse
-from sgimd_torch.changes import watched
+from sgimd_torch.changes import noticing_changes
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.inverses.local_process import LocalProcess
@@ -98,7 +98,7 @@ def sagg_riac(
         problem = Problem(environment, seed, memory, inverse=inverse)
         return Learner(problem, GoalBabbling(problem, **parts))
 
-    return watched(begin, seed, memory, prior)
+    return noticing_changes(begin, seed, memory, prior)
 
 
 @with_keywords_of(GoalBabbling, goals=InterestMap, search=NelderMead)
@@ -131,4 +131,4 @@ def sgim_d(
         problem.autonomous = GoalBabbling(problem, **parts)
         return Learner(problem, problem.autonomous, social=Social.of(social, problem), correspondence=correspondence)
 
-    return watched(begin, seed, memory, prior)
+    return noticing_changes(begin, seed, memory, prior)

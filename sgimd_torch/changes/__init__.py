@@ -3,7 +3,7 @@
 Our addition. When a change is noticed, the learner begins again: it is built anew by the function that has built it.
 The memory of its problem then holds all movements since the change, and those of before that help to predict them, as
 they are or calibrated. The paper asks that a learner focus again where it gets worse (section 3.2.1).
-    return watched(begin, seed, memory, prior)    # at the end of an algorithm
+    return noticing_changes(begin, seed, memory, prior)    # at the end of an algorithm
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Begin = Callable[[int, Memory | None], Learner]
 """Function (seed, exemplars to start from) -> learner."""
 
 
-def watched(begin: Begin, seed: int, memory: Memory | None, prior: Memory | None) -> Learner:
+def noticing_changes(begin: Begin, seed: int, memory: Memory | None, prior: Memory | None) -> Learner:
     """The learner that ``begin`` builds; it begins again when its robot has changed.
 
     Args:
@@ -97,7 +97,7 @@ class Watcher:
             self._notice = Notice(learner.problem, learner.memory, self.prior)
         self._notice.expect(process, context, theta, outcome)
 
-    def look(self) -> tuple[Learner, Change | None] | None:
+    def restart_if_changed(self) -> tuple[Learner, Change | None] | None:
         """A learner to go on as, and the change if a new one was noticed; None to go on."""
         learner = self._learner
         if self._notice is None:

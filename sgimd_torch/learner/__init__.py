@@ -34,7 +34,7 @@ class Watcher(Protocol):
     def expect(self, context: Array, theta: Array, outcome: Array) -> None:
         """Compare an outcome, which is not in memory yet, with what is expected."""
 
-    def look(self) -> tuple[Learner, Change | None] | None:
+    def restart_if_changed(self) -> tuple[Learner, Change | None] | None:
         """A learner to go on as, and the change if a new one was noticed; None to go on."""
 
 
@@ -260,7 +260,7 @@ class Learner:
         self._asked = []
         for (place, _), move, outcome in zip(asked, moves, told, strict=True):
             self._tell(place, move, outcome)
-        self._look()
+        self._restart_if_changed()
 
     def replace_theta(self, theta: Array, *, place: int = 0) -> None:
         """Replace the movement that is asked for at ``place`` by the recorded ``theta``, which equals it but for
@@ -320,7 +320,7 @@ class Learner:
         self._report_new()
         self._remember(context, theta, outcome)
         self._publish(Event(Kind.ADDED, context, theta, outcome=outcome))
-        self._look()
+        self._restart_if_changed()
 
     def translate(self, demonstration: Demonstration) -> Array:
         """theta_d, eq. (6): the policy that corresponds to a demonstration.
@@ -444,9 +444,9 @@ class Learner:
         if self.problem.memory is not self.memory:
             self.problem.memory.add(context, theta, outcome)
 
-    def _look(self) -> None:
+    def _restart_if_changed(self) -> None:
         """Begin again if the robot has changed: attempts end, and all parts are built anew."""
-        found = None if self.watcher is None else self.watcher.look()
+        found = None if self.watcher is None else self.watcher.restart_if_changed()
         if found is None:
             return
         for place in self._places:

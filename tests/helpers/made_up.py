@@ -62,7 +62,6 @@ ERRORS = {  # errors (m) after 5000 movements by name, as in `Evidence`
     # Learners that ask.
     **dict.fromkeys(EXPERIMENTS["asking"], 0.019),
     "sgim-d-initial": 0.045,
-    "sgim-eer": 0.04,
     "sgim-im.toss": 0.5,
     "practice.toss-blind": 1.4,
 }

@@ -13,7 +13,7 @@ from sgimd_torch.options.catalogue import WORDS
 
 ROOT = Path(__file__).parents[2]
 ROOMS = ("forward_model", "asking", "teach", "rivals")
-KEPT = ("goals", "inverses", "searches", "explore", "learner", "memory", "record", "runs", "teachers", "demonstrations")
+KEPT = ("goals", "inverses", "searches", "learner", "memory", "record", "runs", "teachers", "demonstrations")
 
 
 def words_of(room):

@@ -17,8 +17,8 @@ ROWS = [  # a room imports only from rows above its own
     {"spaces", "files", "options"},
     {"memory", "environments"},
     {"parts", "demonstrations"},
-    {"competence", "teachers", "evaluation", "goals", "explore", "figures"},
-    {"inverses", "searches", "board"},
+    {"competence", "teachers", "evaluation", "goals", "searches", "figures"},
+    {"inverses", "board"},
     {"strategies"},
     {"learner"},
     {"changes"},
@@ -68,7 +68,7 @@ LIBRARIES = {  # rooms or single files that may import a library, by library
 WORLDS = {"environments"}
 PROTOCOL = "environments.protocol"  # the part of ``environments`` that other rooms may import
 LEARNING = {
-    *{"parts", "memory", "competence", "goals", "explore", "inverses", "searches", "strategies", "learner", "teachers"},
+    *{"parts", "memory", "competence", "goals", "searches", "inverses", "strategies", "learner", "teachers"},
     *{"asking", "changes", "rivals", "forward_model"},
 }
 FREE = {"runs", "views", "teach", "__init__"}  # rooms that combine learning and environments
