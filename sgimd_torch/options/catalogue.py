@@ -34,7 +34,6 @@ WORDS: Final[dict[str, dict[str, str]]] = {
         "sgim-im-search": "asking.algorithms:sgim_im_search",
         "sgim-acts": "asking.algorithms:sgim_acts",
         "sgim-acts-search": "asking.algorithms:sgim_acts_search",
-        "sgim-eer": "asking.algorithms:sgim_eer",
         "map-elites": "rivals.quality_diversity:map_elites_alone",
         "map-elites-taught": "rivals.quality_diversity:map_elites",
         "isoline": "rivals.quality_diversity:isoline_alone",
@@ -67,7 +66,6 @@ WORDS: Final[dict[str, dict[str, str]]] = {
         "uniform": "goals.uniform:UniformGoals",
         "within-reach": "goals.within_reach:WithinReach",
         "strategic": "asking.interest:StrategicInterest",
-        "entropy": "asking.entropy:EntropyGoals",
     },
     "progress": {
         "gained": "goals.regions:gained_progress",
@@ -82,9 +80,9 @@ WORDS: Final[dict[str, dict[str, str]]] = {
         "gradient": "forward_model.search:GradientSearch",
     },
     "explore": {
-        "anywhere": "explore.anywhere:Anywhere",
-        "widening": "explore.widening:Widening",
-        "returning": "explore.returning:Returning",
+        "anywhere": "searches.explore:Anywhere",
+        "widening": "searches.explore:Widening",
+        "returning": "searches.explore:Returning",
     },
     "inverse": {
         "linear": "inverses.locally_linear:LocallyLinear",

@@ -10,8 +10,8 @@ from runs import LIVE, RUN, content_of, end, start, stopped_at
 from sgimd_torch.board.legend import LEGEND
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import Benchmark, save_benchmark
-from sgimd_torch.forward_model.listener import ModelListener
 from sgimd_torch.forward_model.model import ForwardModel
+from sgimd_torch.forward_model.shared import ModelListener
 from sgimd_torch.memory import Memory
 from sgimd_torch.options.build import build
 from sgimd_torch.options.command_line import main

@@ -28,7 +28,7 @@ KINDS = {
     "social": parts.Social,
 }
 LEARNING = (
-    *("parts", "strategies", "algorithms", "learner", "session", "goals", "inverses", "searches", "explore", "asking"),
+    *("parts", "strategies", "algorithms", "learner", "session", "goals", "inverses", "searches", "asking"),
     *("rivals", "teachers", "forward_model", "competence", "evaluation", "options/build", "runs/run"),
 )
 BY_NAME = {"getattr", "hasattr", "attrgetter"}
