@@ -99,7 +99,7 @@ class Run:
 
     def missed_by(self, movements: int, answer: str = OWN) -> tuple[Array, Array]:
         """Errors ``(n_goals,)`` of an evaluation, and those that the learner expected; NaN: it did not say."""
-        now = (self.errors["movements"] == movements) & (self.errors["answer"] == answer)
+        now = (self.errors["movements"] == movements) & (self.errors["inverse"] == answer)
         return self.errors["error"][now], self.errors["expected"][now]
 
     def own_goals(self) -> OwnGoals:
@@ -291,8 +291,8 @@ def movements_on_disk(path: Path) -> int:
 
 def _by_answer(columns: Columns) -> dict[str, Columns]:
     """The evaluations of each inverse model, by its name; the run's own inverse model is always there, as ``OWN``."""
-    words = columns["answer"]
+    words = columns["inverse"]
     return {
-        word: {name: values[words == word] for name, values in columns.items() if name != "answer"}
+        word: {name: values[words == word] for name, values in columns.items() if name != "inverse"}
         for word in dict.fromkeys((OWN, *words.tolist()))
     }
