@@ -15,15 +15,11 @@ from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.protocol import Environment, SimulationError
 from sgimd_torch.environments.toys import toss
 from sgimd_torch.evaluation import contexts_of_goals, evaluate
-from sgimd_torch.learner.events import Kind
 from sgimd_torch.options.command_line import main
-from sgimd_torch.record import Record
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.signals import command
 from sgimd_torch.session import NoOutcomeError, run
-from sgimd_torch.spaces import Array, Episode, Failure, stream
-from sgimd_torch.teachers import PeriodicTeacher
-from worlds import demonstrations
+from sgimd_torch.spaces import Array, Episode, stream
 
 DIMS = 0, 5, 2
 
@@ -128,39 +124,6 @@ def test_too_many_failures_in_a_row_end_a_run_which_can_go_on() -> None:
     again = list(run(learner, arm, 0, movements=20, failures=3))
     assert [episode.index for episode in again] == list(range(8, 20))
     assert len(learner.memory) == 15
-
-
-def failing_life(path: Path, movements: int):
-    """A taught life on an arm that loses some movements and some contexts, from the record at ``path`` on."""
-    arm = PlanarArm(5, noise=0.01)
-    lost = set(stream(0, "lost").choice(200, 40, replace=False).tolist())
-    learner = sgim_d(arm, 0, correspondence=arm.correspondence)
-    teacher = PeriodicTeacher(demonstrations(arm), stream(0, "teacher"), every=20)
-
-    def moved(indices, contexts, thetas):
-        ((index, context, theta),) = zip(indices, contexts, thetas, strict=True)
-        return [
-            Failure("ConnectionError: lost")
-            if index in lost
-            else arm.execute(context, theta, stream(0, "environment", index))
-        ]
-
-    with Record.make(path, DIMS, {}) if not path.exists() else Record(path, write=True) as record:
-        episodes = list(run(learner, arm, 0, movements=movements, teacher=teacher, execute=moved, record=record))
-        record.commit()
-    return learner, episodes
-
-
-def test_a_life_with_failures_goes_on_from_its_record_as_if_it_had_never_stopped(tmp_path: Path) -> None:
-    whole, episodes = failing_life(tmp_path / "whole", 150)
-    failing_life(tmp_path / "parts", 70)
-    parts, again = failing_life(tmp_path / "parts", 150)
-    assert sum(bool(episode.failed) for episode in episodes) > 20
-    assert [(e.index, e.failed) for e in again] == [(e.index, e.failed) for e in episodes]
-    assert parts.memory.outcomes.tobytes() == whole.memory.outcomes.tobytes()
-    with Record(tmp_path / "whole") as one, Record(tmp_path / "parts") as other:
-        assert list(one.rows("events")) == list(other.rows("events"))
-        assert {event.reply for event in one.events() if event.kind == Kind.FAILED} == {"ConnectionError: lost"}
 
 
 @pytest.mark.parametrize("together", [False, True])

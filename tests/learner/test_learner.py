@@ -177,6 +177,22 @@ def test_an_interrupted_learner_forgets_what_it_asked_for_and_begins_again() -> 
     assert len(robot.memory) == 2
 
 
+def test_a_movement_made_elsewhere_enters_memory_but_counts_as_none() -> None:
+    robot, kinds = learner(Pursuit()), list[str]()
+    robot.listeners.append(lambda event: kinds.append(str(event.kind)))
+    robot.add(NO_CONTEXT, [0.5] * 4, [0.9, 0.1])
+    for theta, outcome, said in (
+        ([0.5, 0.5, 0.5, 1.5], [0.9, 0.1], "theta must lie in its box"),
+        ([0.5] * 4, [0.9, np.nan], "outcome"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            robot.add(NO_CONTEXT, theta, outcome)
+    robot.ask(NO_CONTEXT)
+    with pytest.raises(RuntimeError, match=r"was tell\(\) forgotten"):
+        robot.add(NO_CONTEXT, [0.5] * 4, [0.9, 0.1])
+    assert (len(robot.memory), robot.movements, kinds) == (1, 0, ["added"])
+
+
 def test_a_demonstration_that_does_not_fit_is_refused_and_interrupts_nothing() -> None:
     pursuit = Pursuit()
     robot = learner(pursuit)
@@ -203,11 +219,6 @@ def test_a_social_strategy_without_a_correspondence_is_refused() -> None:
 def test_a_strategy_without_any_movement_is_an_error_not_an_endless_loop() -> None:
     with pytest.raises(RuntimeError, match="yield"):
         learner(Pursuit(n=0)).ask(NO_CONTEXT)
-
-
-def test_there_is_no_context_to_keep_while_nothing_is_under_way() -> None:
-    with pytest.raises(RuntimeError, match="idle"):
-        _ = sagg_riac(PlanarArm(4), 0).context
 
 
 def test_what_callers_hand_in_may_change_afterwards() -> None:
