@@ -17,7 +17,6 @@ import traceback
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from itertools import chain
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -125,11 +124,9 @@ def run(
     before: dict[int, BeforeMovement] = {}
     with ExitStack() as until_the_end:
         if record is not None:
-            events = record.events()
-            if (recorded := next(events, None)) is not None:
-                from sgimd_torch.record.replay import replay  # most programs have no record to replay
+            from sgimd_torch.record.replay import replay  # most programs have no record
 
-                before = yield from replay(learner, chain([recorded], events), teacher=teacher)
+            before = yield from replay(learner, record.events(), teacher=teacher)
             learner.listeners.append(record.add)
             until_the_end.callback(learner.listeners.remove, record.add)
         in_a_row: list[Failure] = []
@@ -195,12 +192,12 @@ def _asked(
     request = learner.request(context, place=place)
     if request is None:
         return before
-    answer, reply = _answer(learner, environment, context, request, teachers)
-    if answer is None:
+    demonstration, reply = _reply(learner, environment, context, request, teachers)
+    if demonstration is None:
         learner.go_on_alone(reply, place=place)
         return before._replace(request=request, reply=reply)
-    learner.watch(answer, place=place)
-    return BeforeMovement(answer, request, reply)
+    learner.watch(demonstration, place=place)
+    return BeforeMovement(demonstration, request, reply)
 
 
 def _executed(
@@ -230,7 +227,7 @@ def reason_of(error: BaseException) -> str:
     return "".join(sign if sign.isprintable() else " " for sign in said)[:300].strip()
 
 
-def _answer(
+def _reply(
     learner: Learner, environment: Environment, context: Array, request: Request, teachers: Mapping[str, Demonstrator]
 ) -> tuple[Demonstration | None, str]:
     """The demonstration that replies to a request (None: there is no new and usable one), and ``Episode.reply``.

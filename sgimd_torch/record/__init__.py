@@ -3,13 +3,8 @@
     with Record.make(path, dims, settings) as record: record.add(event); record.commit()  # one writer
     with Record(path) as record: list(record.events()); record.rows("evaluations")  # any number of readers
 
-Tables (``docs/runs.md`` explains each column):
-    about            settings, versions and run times, as json
-    events           everything that happened, in order: moved, rested, shown, asked, failed, interrupted
-    demonstrations   each demonstration that was shown, once
-    goals            goals of evaluation
-    evaluations, errors, regions     rows of each evaluation
-    predictions, refreshes           rows of a forward model
+`layout` has the tables, and ``docs/runs.md`` explains each column: settings and other facts (``about``), everything
+that happened (``events``), each demonstration once, and tables that a replay fills again (``DERIVED``).
 
 Every row ends in a checksum of itself, its number and its table, and the table ``about`` has the number of rows of each
 table. So reading raises an error if a row was changed, lost, doubled or moved.
@@ -65,6 +60,7 @@ class Record:
     Attributes:
         about: settings, versions and other facts about the run, by name; ``commit`` writes them.
         dims: dimensions of context, theta and outcome.
+        movements: number of recorded movements, rests and uncommitted movements included.
 
     Raises:
         RunError: there is no record at ``path``, it is damaged, or another process is writing it.
@@ -74,7 +70,7 @@ class Record:
         self.path = Path(path)
         self._n_rows: dict[str, int] = {}  # by table
         self._version: Any = None  # version of the file at the last lock; each writer changes it
-        self._movements = 0
+        self.movements = 0
         self._numbers: dict[bytes, int] = {}  # number of each demonstration, from 0, by its content
         self._failure: Exception | None = None  # the error of a failed write
         self._connection = _connect(self.path, write)
@@ -117,11 +113,6 @@ class Record:
         """Close the file; uncommitted rows are lost."""
         self._connection.close()
 
-    @property
-    def movements(self) -> int:
-        """Number of recorded movements, rests and uncommitted movements included."""
-        return self._movements
-
     def rows(self, table: str) -> Iterator[Row]:
         """The rows of a table, in order, without their checksums.
 
@@ -156,8 +147,8 @@ class Record:
     def add(self, event: Event) -> None:
         """Append an event; it is on the disk after ``commit``."""
         lesson = None if event.lesson is None else self._number_of(event.lesson)
-        self._append("events", [event_row(event, self._movements, lesson, self.dims)])
-        self._movements = movements_after(self._movements, event.kind)
+        self._append("events", [event_row(event, self.movements, lesson, self.dims)])
+        self.movements = movements_after(self.movements, event.kind)
 
     def add_rows(self, table: str, rows: Iterable[Sequence[Any]]) -> None:
         """Append rows to one of the ``DERIVED`` tables; NaN is stored as NULL."""
@@ -240,7 +231,7 @@ class Record:
         if {name: statements.get(name) for name in tables} != tables:
             raise RunError(f"its tables are not those of a record; {HINT}")
         last = self._connection.execute("SELECT movement, kind FROM events ORDER BY rowid DESC LIMIT 1").fetchone()
-        self._movements = 0 if last is None else movements_after(*last)
+        self.movements = 0 if last is None else movements_after(*last)
 
     def _lock(self) -> None:
         """Lock the file against other writers until this record is closed; readers are still admitted."""
@@ -277,8 +268,6 @@ def _connect(path: Path, write: bool) -> sqlite3.Connection:
     # Never open the file here in another way: closing it would release all locks that this process has on the file.
     if not path.is_file():
         raise RunError(f"there is no record {path}")
-    if not path.stat().st_size:
-        raise RunError(f"{path} is still empty")
     try:
         # Readers need mode=rw, too, to clean up after a killed writer. SQLite still opens a read-only file for reading.
         # check_same_thread=False: teaching by hand opens the record in one thread and later uses it in another.

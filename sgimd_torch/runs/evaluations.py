@@ -38,9 +38,6 @@ class Evaluations:
         parts: parts of the run; their ``answers`` are evaluated.
         record: record of the run; movements of an evaluation are not recorded.
         between: function to call between movements of an evaluation; it may raise `KeyboardInterrupt`.
-
-    Attributes:
-        made: number of movements of all evaluations so far, recorded ones included.
     """
 
     parts: RunParts
@@ -51,32 +48,25 @@ class Evaluations:
         rows: dict[int, dict[str, list[Any]]] = {}
         for movements, word, _, *numbers in self.record.rows("errors"):
             rows.setdefault(movements, {}).setdefault(word, []).append(numbers)
-        self._found: dict[int, ByInverse] = {
+        self._by_movements: dict[int, ByInverse] = {
             movements: {word: _evaluation(np.array(numbers, dtype=np.float64)) for word, numbers in by_word.items()}
             for movements, by_word in rows.items()
         }
-        self.made = sum(map(self.size, self._found))
 
     @property
     def last(self) -> Evaluation | None:
         """The last evaluation of the run's own inverse model, None if there is none."""
-        return self._found[max(self._found)][OWN] if self._found else None
-
-    def size(self, movements: int) -> int:
-        """Number of movements of the evaluation after this number of ``movements``."""
-        different = len(set(map(id, self.parts.inverses.values())))
-        return len(self.parts.benchmark.goals) * (different + self._repeats(movements))
+        return self._by_movements[max(self._by_movements)][OWN] if self._by_movements else None
 
     def after(self, movements: int) -> ByInverse | None:
         """The recorded evaluation after this number of movements, else a new evaluation of the present learner.
 
         The result is None while memory is empty: the observing learner remembers nothing before a demonstration.
         """
-        if movements not in self._found and len(self.parts.learner.memory):
-            self._found[movements] = self._evaluate(movements)
-            self.made += self.size(movements)
-            self._write(movements, self._found[movements])
-        return self._found.get(movements)
+        if movements not in self._by_movements and len(self.parts.learner.memory):
+            self._by_movements[movements] = self._evaluate(movements)
+            self._write(movements, self._by_movements[movements])
+        return self._by_movements.get(movements)
 
     def _evaluate(self, movements: int) -> ByInverse:
         """Evaluate with streams that the run does not use.

@@ -95,9 +95,7 @@ class RunLoop:
 
             board = BoardListener(parts.config.directory, parts, self.seconds.summary, self._curves)
             self.listeners.append(board)
-        self._wanted = {  # number of movements of each evaluation to come, by the number of movements before it
-            movements: self.evaluations.size(movements) for movements in parts.config.evaluations
-        }
+        self._wanted = parts.config.evaluations  # numbers of movements before the evaluations to come
         self._committed = time.monotonic()
 
     def __enter__(self) -> Self:
@@ -143,17 +141,14 @@ class RunLoop:
         """Make all movements, or stop after the movement during which ``stopping`` has heard a signal."""
         total, title = self.parts.config.movements, self.parts.config.title
         unit = self.parts.environment.outcomes.amount
-        before = self.seconds.summary()["seconds_evaluation"]
         self.evaluations.between = partial(self._stop_if, stopping)
         with Progress("replaying" if self.recorded else title, self.recorded or total) as progress:
             for _ in self.episodes():
                 last = self.evaluations.last
                 note = "" if last is None else f"error {unit(last.mean_error, '.4f')}"
-                spent = self.seconds.summary()["seconds_evaluation"]
-                progress.show(self.movements, note, spent=spent - before, later=self._later)
+                progress.show(self.movements, note)
                 if self.movements == self.recorded < total:
                     progress.begin(title, total, self.movements)
-                    before = spent
                 self._stop_if(stopping)
         self.commit()
 
@@ -202,18 +197,6 @@ class RunLoop:
             while not self._committed_now():
                 time.sleep(COMMIT_EVERY)
 
-    @property
-    def _later(self) -> float:
-        """Time (s) of the evaluations to come, if their movements take as long as those of the evaluations so far.
-
-        Before the first evaluation: as long as those of the run.
-        """
-        if self.replaying:
-            return 0.0
-        seconds, made = self.seconds.summary(), self.evaluations.made
-        per_movement = seconds["seconds_evaluation"] / made if made else seconds["seconds_physics"] / self.movements
-        return per_movement * sum(self._wanted.values())
-
     def _stop_if(self, stopping: Stopping) -> None:
         """Stop between two movements of the run or of an evaluation, if a signal was heard."""
         if stopping.heard and self._all_told:
@@ -242,10 +225,8 @@ class RunLoop:
                 say(f"movement {episode.index} failed: {episode.failed}{more}")
         for listener in self.listeners:
             listener.episode(episode, replayed)
-        due = [moment for moment in self._wanted if moment <= self.movements]
-        if due and self._all_told:
-            for moment in due:
-                del self._wanted[moment]
+        if self._wanted and self._wanted[0] <= self.movements and self._all_told:
+            self._wanted = [movements for movements in self._wanted if movements > self.movements]
             self._evaluate()
         if self.movements == self.recorded:
             self._begin()
