@@ -254,8 +254,6 @@ def asking(found: Evidence) -> list[Claim]:
               [at_most(0, more, "shown", dear, "shown", im, form="+.0f")]),
         Claim("... and has a smaller error than SGIM-D at equal total cost",
               [at_most(0, at_equal_cost, form="+.4f")]),
-        Claim("Entropy: SGIM-IM has a smaller error than a learner that asks by entropy: < 0 at 1000, 5000",
-              less(found, im, "sgim-eer", 1000, LAST)),
         Claim("Contexts: on the toss SGIM-IM has a smaller error than a learner to which the wind is hidden: < 0 at "
               "1000, 2000", less(found, toss, "practice.toss-blind", 1000, 2000)),
         Claim("... a smaller error than without a teacher", less(found, toss, "practice.toss", 1000, 2000)),

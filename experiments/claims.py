@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from sgimd_torch.runs.process import command, loading, say
+from sgimd_torch.runs.signals import command, loading, say
 
 with loading():  # Ctrl-C shows no traceback
     import jinja2

@@ -18,7 +18,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any, Final
 
-from sgimd_torch.runs.process import command, loading, say
+from sgimd_torch.runs.signals import command, loading, say
 
 with loading():  # Ctrl-C shows no traceback
     import numpy as np
@@ -26,10 +26,10 @@ with loading():  # Ctrl-C shows no traceback
 
     import changing
     import random_robots
-    from sgimd_torch.catalogue import unknown
     from sgimd_torch.files import make_folder
+    from sgimd_torch.options.catalogue import unknown
+    from sgimd_torch.options.config import OWN, Config
     from sgimd_torch.record import RunError
-    from sgimd_torch.runs.config import OWN, Config
     from sgimd_torch.runs.parallel import sweep
     from sgimd_torch.runs.read import finished, read_run
     from sgimd_torch.runs.sweep import add_options

@@ -25,7 +25,7 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-from sgimd_torch.runs.process import command, loading, say
+from sgimd_torch.runs.signals import command, loading, say
 
 with loading():  # Ctrl-C shows no traceback
     import numpy as np

@@ -14,7 +14,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, Final
 
-from sgimd_torch.runs.process import Progress, say
+from sgimd_torch.runs.signals import Progress, say
 from table import TABLES, merge, read_table
 
 Life = Callable[..., Mapping[int, tuple[float, int]]]

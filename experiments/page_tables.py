@@ -192,7 +192,7 @@ class Page:
             ["practice", "practice-taught", "sgim-d", *names], key=lambda name: self.error(name, LAST, ".9f")
         ):
             shown = "0" if name == "practice" else "all"
-            if name.startswith(("sgim-im", "sgim-acts", "sgim-eer")):
+            if name.startswith(("sgim-im", "sgim-acts")):
                 shown = self.cell(self.found.count, "asked", name, "shown", form=".0f")
             rows.append([f"`{name}`", *self.errors(name, (1000, LAST)), shown])
         return markdown(("learner", "1000", "5000", "shown"), rows)

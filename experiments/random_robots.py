@@ -27,7 +27,6 @@ from numpy.typing import ArrayLike
 from lives import make_lives, parser
 from sgimd_torch.algorithms.paper import random_exploration, sagg_riac
 from sgimd_torch.algorithms.practice import PRACTICE, practice
-from sgimd_torch.explore.returning import Returning
 from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.goals.uniform import UniformGoals
 from sgimd_torch.inverses.among_effects import AmongEffects
@@ -35,7 +34,8 @@ from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.learner import Learner
 from sgimd_torch.parts import Inverse
-from sgimd_torch.runs.process import command
+from sgimd_torch.runs.signals import command
+from sgimd_torch.searches.explore import Returning
 from sgimd_torch.searches.perturb import Perturb
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Array, Box

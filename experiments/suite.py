@@ -26,11 +26,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from sgimd_torch.catalogue import ROD
-from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.process import command
+from sgimd_torch.options.catalogue import ROD
+from sgimd_torch.options.config import Config
 from sgimd_torch.runs.read import finished
-from sgimd_torch.runs.sweep import add_options, add_vary, carry_out, variants_of
+from sgimd_torch.runs.signals import command
+from sgimd_torch.runs.sweep import add_options, add_vary, run_all, variants_of
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Carry out unfinished runs, print a table for each task, and return the exit code: 1 if runs failed, else 0."""
     options, rest = parsed_options(argv)
     configs, flags = runs_of(options, rest)
-    code = carry_out(configs, options, flags, configs[0].out.parent)
+    code = run_all(configs, options, flags, configs[0].out.parent)
     from sgimd_torch.views import table  # scipy's statistics are slow to import
 
     for folder in [] if options.dry_run else dict.fromkeys(config.out for config in configs if finished(config)):

@@ -18,8 +18,8 @@ import pandas as pd
 from sgimd_torch.asking.teachers import middle
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.files import make_folder, write_text
-from sgimd_torch.runs.build import task_of
-from sgimd_torch.runs.config import OWN, Config
+from sgimd_torch.options.build import task_of
+from sgimd_torch.options.config import OWN, Config
 from sgimd_torch.runs.read import Run
 from sgimd_torch.runs.tasks import benchmark_of
 from sgimd_torch.runs.tasks.taught import demonstrations_of

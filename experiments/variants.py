@@ -212,7 +212,6 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
                 **{f"sgim-acts-{number}": {**ACTS, "teachers": (f"demonstrator-{number}",)} for number in (1, 2)},
                 "sgim-acts-four": {**ACTS, "teachers": (*RECORDED, f"experiments.mislabelling:{MISLABELLING}")},
                 "sgim-acts-halves": {**ACTS, "teachers": HALVES},
-                "sgim-eer": {"algorithm": "sgim-eer"},
             }.items()
         },
         "sgim-im.toss": {**IM, **TASKS["toss"].options, **SHORT},

@@ -17,10 +17,10 @@ import numpy as np
 from jsonargparse.typing import NonNegativeInt, Path_fc, PositiveInt
 
 from sgimd_torch.evaluation import SHIPPED
-from sgimd_torch.runs.config import Config
+from sgimd_torch.options.config import Config
 from sgimd_torch.runs.parallel import sweep
-from sgimd_torch.runs.process import Failed
 from sgimd_torch.runs.read import read_run
+from sgimd_torch.runs.signals import Failed
 from sgimd_torch.spaces import Array
 from sgimd_torch.views import benchmark
 

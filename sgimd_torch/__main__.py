@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from typing import Final
 
 from sgimd_torch import __version__
-from sgimd_torch.catalogue import EXTRAS, WORDS, about, unknown
-from sgimd_torch.runs.process import command, loading
+from sgimd_torch.options.catalogue import EXTRAS, WORDS, about, unknown
+from sgimd_torch.runs.signals import command, loading
 
 HELP: Final = f"""usage: sgimd COMMAND [OPTIONS]
 

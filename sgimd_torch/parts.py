@@ -16,9 +16,9 @@ from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
-from sgimd_torch.catalogue.built import Built
 from sgimd_torch.environments.protocol import Environment, check_robot
 from sgimd_torch.memory import Memory
+from sgimd_torch.options.built import Built
 from sgimd_torch.spaces import Array, AskingAttempt, Attempt, Demonstration, Estimate, stream
 
 Made = TypeVar("Made")
@@ -110,16 +110,12 @@ class Trained(ABC):
     """Object that parts share and that is trained while the learner moves, such as a forward model."""
 
     @abstractmethod
-    def refresh(self, memory: Memory) -> Any:
+    def refresh(self, memory: Memory) -> object:
         """Learn from the newest exemplars in ``memory``."""
-
-    @abstractmethod
-    def listener(self, life: Any) -> Any:
-        """Listener (`runs.run.Listener`) that calls `refresh` in the run ``life`` (`runs.run.Life`)."""
 
 
 class Goals(Part):
-    """Goal model: chooses goals by the results of earlier goals (section 3.2). `goals.checks` has argument checks."""
+    """Goal model: chooses goals by the results of earlier goals (section 3.2). `goals.uniform` has argument checks."""
 
     draws_from = "goals"
 
@@ -150,6 +146,8 @@ class Goals(Part):
 
 class Inverse(Part):
     """Inverse model: infers a movement for a goal (section 4.4.2). It reads the memory and draws nothing."""
+
+    says_how_sure: ClassVar[bool] = True  # whether estimates may have ``expected`` and ``sd``
 
     @abstractmethod
     def __call__(self, context: Array, goal: Array) -> Estimate:
@@ -226,6 +224,8 @@ class Strategy(Part):
 class Social(Part):
     """Social strategy: what a learner does after a demonstration (sections 3.2.3 and 4.2)."""
 
+    remembers: ClassVar[bool] = False  # whether demonstrations enter the memory
+
     @abstractmethod
     def attempt(self, context: Array, theta_d: Array, demonstration: Demonstration) -> Attempt:
         """Yield movements, or none, after a ``demonstration`` whose policy is ``theta_d`` ``(theta_dim,)``, eq. (6)."""
@@ -248,3 +248,18 @@ class Teacher(Built):
     @abstractmethod
     def offer(self, index: int, memory: Memory) -> Demonstration | None:
         """The demonstration before movement ``index`` (0, 1, ...) of the learner with this ``memory``, or None."""
+
+
+class Demonstrator(Built):
+    """Teacher who is asked for a demonstration of a goal. Built from ``(demonstrations, rng)`` and options.
+
+    Attributes:
+        takes: duration of a reply, in movements, for which the learner rests.
+    """
+
+    takes: int = 0
+
+    @abstractmethod
+    def demonstrate(self, context: Array, goal: Array, memory: Memory) -> Demonstration | None:
+        """A demonstration of ``goal`` ``(outcome_dim,)`` in ``context`` ``(context_dim,)``, or None. A replayed
+        run repeats the request and needs an equal reply, so random draws must depend only on seed and arguments."""

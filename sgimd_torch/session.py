@@ -33,7 +33,7 @@ from sgimd_torch.environments.protocol import (
 )
 from sgimd_torch.learner import Learner
 from sgimd_torch.learner.events import BeforeMovement
-from sgimd_torch.parts import Teacher
+from sgimd_torch.parts import Demonstrator, Teacher
 from sgimd_torch.spaces import (
     Array,
     Demonstration,
@@ -48,7 +48,6 @@ from sgimd_torch.spaces import (
 )
 
 if TYPE_CHECKING:
-    from sgimd_torch.learner.requests import Demonstrator
     from sgimd_torch.record import Record
 
 JOINS_EVERY: Final = 30

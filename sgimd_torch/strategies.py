@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from sgimd_torch.competence import Competence
-from sgimd_torch.explore.anywhere import Anywhere
 from sgimd_torch.parts import Explore, Goals, Judge, Part, Problem, Search, Social, Strategy
+from sgimd_torch.searches.explore import Anywhere
 from sgimd_torch.spaces import Array, Attempt, Demonstration, Move, check_count
 
 
@@ -267,13 +267,15 @@ class Emulate(Social):
 class Remember(Social):
     """Learn by observation: remember (theta_d, tau_d) like an executed movement, and do not move."""
 
+    remembers = True
+
     def attempt(self, context: Array, theta_d: Array, demonstration: Demonstration) -> Attempt:
         """No movement."""
         self.problem.memory.add(context, theta_d, demonstration.outcome)
         yield from ()  # makes this a generator
 
 
-def watched(attempt: Attempt, executed: list[tuple[Array, Array]]) -> Attempt:
+def recording_outcomes(attempt: Attempt, executed: list[tuple[Array, Array]]) -> Attempt:
     """The movements of ``attempt``; each theta is appended to ``executed`` with its outcome.
 
     The memory may have outcomes of other robots in between.

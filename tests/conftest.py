@@ -9,8 +9,8 @@ import pytest
 from own import MODULE
 from runs import arguments, content_of
 from sgimd_torch.evaluation import Benchmark, save_benchmark
-from sgimd_torch.runs.command_line import main
-from sgimd_torch.runs.process import command
+from sgimd_torch.options.command_line import main
+from sgimd_torch.runs.signals import command
 
 # MuJoCo is imported without OpenGL, as a display may be missing; pictures in space are made in processes of their own.
 os.environ.setdefault("MUJOCO_GL", "disable")

@@ -9,7 +9,7 @@ from collections import defaultdict
 from pathlib import Path
 
 import sgimd_torch
-from sgimd_torch.runs.config import Config
+from sgimd_torch.options.config import Config
 
 SGIM_D = {
     "environment": "fishing-rod",

@@ -5,10 +5,10 @@ import re
 import numpy as np
 import pytest
 
+from sgimd_torch.options import command_line
 from sgimd_torch.record import RunError
-from sgimd_torch.runs import command_line
-from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
+from sgimd_torch.runs.signals import command
 
 MODULE = '''
 import numpy as np

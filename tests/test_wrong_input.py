@@ -11,7 +11,7 @@ from sgimd_torch.__main__ import _call
 from sgimd_torch.algorithms.paper import sgim_d
 from sgimd_torch.environments.protocol import execute_many
 from sgimd_torch.evaluation import evaluate
-from sgimd_torch.runs.process import command
+from sgimd_torch.runs.signals import command
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.spaces import Box, Demonstration, stream
 from sgimd_torch.teachers import PeriodicTeacher

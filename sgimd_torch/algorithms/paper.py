@@ -14,13 +14,13 @@ from collections.abc import Callable
 from typing import Any
 
 from sgimd_torch.algorithms import MakeInverse
-from sgimd_torch.catalogue.options import hands_on
-from sgimd_torch.changes import watched
+from sgimd_torch.changes import noticing_changes
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Correspondence, Learner
 from sgimd_torch.memory import Memory
+from sgimd_torch.options.signature import with_keywords_of
 from sgimd_torch.parts import Problem, Social
 from sgimd_torch.searches.simplex import NelderMead
 from sgimd_torch.strategies import Babble, GoalBabbling, Imitate, Mimic, Remember, Rest
@@ -73,7 +73,7 @@ def imitation(
     return Learner(problem, Rest(problem), social=mimic, correspondence=correspondence)
 
 
-@hands_on(GoalBabbling, goals=InterestMap, search=NelderMead)
+@with_keywords_of(GoalBabbling, goals=InterestMap, search=NelderMead)
 def sagg_riac(
     environment: Environment,
     seed: int,
@@ -98,10 +98,10 @@ def sagg_riac(
         problem = Problem(environment, seed, memory, inverse=inverse)
         return Learner(problem, GoalBabbling(problem, **parts))
 
-    return watched(begin, seed, memory, prior)
+    return noticing_changes(begin, seed, memory, prior)
 
 
-@hands_on(GoalBabbling, goals=InterestMap, search=NelderMead)
+@with_keywords_of(GoalBabbling, goals=InterestMap, search=NelderMead)
 def sgim_d(
     environment: Environment,
     seed: int,
@@ -131,4 +131,4 @@ def sgim_d(
         problem.autonomous = GoalBabbling(problem, **parts)
         return Learner(problem, problem.autonomous, social=Social.of(social, problem), correspondence=correspondence)
 
-    return watched(begin, seed, memory, prior)
+    return noticing_changes(begin, seed, memory, prior)

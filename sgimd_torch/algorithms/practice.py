@@ -14,16 +14,15 @@ from typing import Any, Final
 
 from sgimd_torch.algorithms import MakeInverse
 from sgimd_torch.algorithms.families import TwoFamilies
-from sgimd_torch.catalogue.options import hands_on
-from sgimd_torch.changes import watched
+from sgimd_torch.changes import noticing_changes
 from sgimd_torch.environments.protocol import Environment
-from sgimd_torch.explore.returning import Returning
-from sgimd_torch.explore.widening import Widening
 from sgimd_torch.goals.within_reach import WithinReach
 from sgimd_torch.inverses.among_effects import AmongEffects
 from sgimd_torch.learner import Correspondence, Learner
 from sgimd_torch.memory import Memory
+from sgimd_torch.options.signature import with_keywords_of
 from sgimd_torch.parts import Problem, Social
+from sgimd_torch.searches.explore import Returning, Widening
 from sgimd_torch.searches.perturb import Vary
 from sgimd_torch.spaces import stream
 from sgimd_torch.strategies import GoalBabbling, Imitate
@@ -39,7 +38,7 @@ PRACTICE: Final[dict[str, Any]] = {
 ONCE: Final = partial(Imitate, repeats=1)
 
 
-@hands_on(GoalBabbling, **PRACTICE)
+@with_keywords_of(GoalBabbling, **PRACTICE)
 def practice(
     environment: Environment,
     seed: int,
@@ -58,10 +57,10 @@ def practice(
         families = _families(environment, seed, memory, inverse, parts)
         return Learner(families.problem, families)
 
-    return watched(begin, seed, memory, prior)
+    return noticing_changes(begin, seed, memory, prior)
 
 
-@hands_on(GoalBabbling, **PRACTICE)
+@with_keywords_of(GoalBabbling, **PRACTICE)
 def practice_taught(
     environment: Environment,
     seed: int,
@@ -84,7 +83,7 @@ def practice_taught(
         problem.autonomous = families.wide  # its goal model is told of demonstrated goals
         return Learner(problem, families, social=Social.of(social, problem), correspondence=correspondence)
 
-    return watched(begin, seed, memory, prior)
+    return noticing_changes(begin, seed, memory, prior)
 
 
 def _families(

@@ -17,9 +17,9 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sgimd_torch.goals.checks import check_in
 from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.goals.regions import Region
+from sgimd_torch.goals.uniform import check_in
 from sgimd_torch.parts import Goals, Problem
 from sgimd_torch.spaces import Array
 

@@ -18,7 +18,7 @@ from sgimd_torch.asking.interest import AUTONOMOUS, StrategicGoals
 from sgimd_torch.goals.regions import Region
 from sgimd_torch.parts import Part, Problem, Social, Strategy
 from sgimd_torch.spaces import Array, AskingAttempt, Request
-from sgimd_torch.strategies import GoalBabbling, watched
+from sgimd_torch.strategies import GoalBabbling, recording_outcomes
 
 
 class Asking(NamedTuple):
@@ -87,7 +87,7 @@ class StrategicBabbling(Strategy):
         executed: list[tuple[Array, Array]] = []
         there = self.babbling.competence(context, shown)
         try:
-            yield from watched(answer.attempt(context, *lesson), executed)
+            yield from recording_outcomes(answer.attempt(context, *lesson), executed)
         finally:  # interruption by another demonstration included
             outcomes = [outcome for _, outcome in executed]
             self.babbling.conclude(context, goal, outcomes, before, strategy)

@@ -15,8 +15,8 @@ from functools import partial
 import numpy as np
 
 from sgimd_torch.demonstrations import SHIPPED, load_demonstrations
-from sgimd_torch.learner.requests import Demonstrator
 from sgimd_torch.memory import Memory
+from sgimd_torch.parts import Demonstrator
 from sgimd_torch.spaces import Array, Demonstration, check_count, check_point
 from sgimd_torch.teachers import check_demonstrations
 

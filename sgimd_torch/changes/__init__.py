@@ -3,7 +3,7 @@
 Our addition. When a change is noticed, the learner begins again: it is built anew by the function that has built it.
 The memory of its problem then holds all movements since the change, and those of before that help to predict them, as
 they are or calibrated. The paper asks that a learner focus again where it gets worse (section 3.2.1).
-    return watched(begin, seed, memory, prior)    # at the end of an algorithm
+    return noticing_changes(begin, seed, memory, prior)    # at the end of an algorithm
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Final
 
-from sgimd_torch.inverses.among_effects import AmongEffects
+from sgimd_torch.inverses.among_effects import process_of
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Learner
 from sgimd_torch.learner.events import Change
@@ -27,7 +27,7 @@ Begin = Callable[[int, Memory | None], Learner]
 """Function (seed, exemplars to start from) -> learner."""
 
 
-def watched(begin: Begin, seed: int, memory: Memory | None, prior: Memory | None) -> Learner:
+def noticing_changes(begin: Begin, seed: int, memory: Memory | None, prior: Memory | None) -> Learner:
     """The learner that ``begin`` builds; it begins again when its robot has changed.
 
     Args:
@@ -53,7 +53,7 @@ def check_watcher(learner: Learner) -> None:
     Raises:
         ValueError: the learner has a prior, which would then count for good.
     """
-    if _process_of(learner) is None:
+    if not learner.inverse.says_how_sure:
         why = f"{type(learner.inverse).__name__} does not say how sure it is"
     elif learner.problem.trained:
         why = "a forward model cannot begin again"
@@ -73,15 +73,23 @@ class Watcher:
     def __init__(self, begin: Begin, learner: Learner, prior: Memory | None) -> None:
         self._begin, self._learner, self.prior, self._seed = begin, learner, prior, learner.problem.seed
         self._notice: Notice | None = None
+        self._inverse, self._process = learner.inverse, process_of(learner.inverse)
         if prior is not None:
             learner.memory, learner.begun = Memory(*learner.problem.dims), 0
         self._numbers = [0] * learner.begun  # of each exemplar the number of its movement, or of the last one before it
 
+    @property
+    def process(self) -> LocalProcess:
+        """Local process from which movements are predicted."""
+        if self._learner.inverse is not self._inverse:
+            self._inverse, self._process = self._learner.inverse, process_of(self._learner.inverse)
+        return self._process
+
     def expect(self, context: Array, theta: Array, outcome: Array) -> None:
         """Compare an outcome, which is not in memory yet, with what is expected."""
-        learner, process = self._learner, _process_of(self._learner)
+        learner, process = self._learner, self.process
         self._numbers.append(max(0, learner.movements - 1))
-        if process is None or (self.prior is None and len(process.memory) < _FIRST):
+        if self.prior is None and len(process.memory) < _FIRST:
             return
         if self._notice is None:
             from sgimd_torch.changes.notice import Notice  # the first movements of a life do not need it
@@ -89,12 +97,12 @@ class Watcher:
             self._notice = Notice(learner.problem, learner.memory, self.prior)
         self._notice.expect(process, context, theta, outcome)
 
-    def look(self) -> tuple[Learner, Change | None] | None:
+    def restart_if_changed(self) -> tuple[Learner, Change | None] | None:
         """A learner to go on as, and the change if a new one was noticed; None to go on."""
-        learner, process = self._learner, _process_of(self._learner)
-        if self._notice is None or process is None:
+        learner = self._learner
+        if self._notice is None:
             return None
-        found = self._notice.look(process)
+        found = self._notice.look(self.process)
         if found is None:
             return None
         n = len(learner.memory)
@@ -104,9 +112,3 @@ class Watcher:
             return new, None
         since = self._numbers[self._notice.since]
         return new, Change(since, learner.movements, found.before, found.kept)
-
-
-def _process_of(learner: Learner) -> LocalProcess | None:
-    inverse = learner.inverse
-    inverse = inverse.of_all if isinstance(inverse, AmongEffects) else inverse
-    return inverse if isinstance(inverse, LocalProcess) else None

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from sgimd_torch.inverses.kernels import covariances, expected, fitted, unknown
-from sgimd_torch.memory.jit import LISTS, NUMBERS, TABLE, called, columns
+from sgimd_torch.memory.jit import LISTS, NUMBERS, TABLE, columns, compiled_for
 from sgimd_torch.spaces import Array
 
 
-@called(TABLE, TABLE, LISTS, TABLE, NUMBERS)
+@compiled_for(TABLE, TABLE, LISTS, TABLE, NUMBERS)
 def predict(inputs: Array, outcomes: Array, near: np.ndarray, here: Array, kernel: Array) -> tuple[Array, Array, Array]:
     """Expected outcomes ``(n, outcome_dim)`` of movements, their variances ``(n,)``, noise included, and the slopes of
     the outcomes by the inputs, ``(n, outcome_dim, dim)``.

@@ -13,8 +13,8 @@ from typing import Final
 import mujoco
 import numpy as np
 
-from sgimd_torch.catalogue import did_you_mean
 from sgimd_torch.files import check_regular
+from sgimd_torch.options.catalogue import did_you_mean
 from sgimd_torch.spaces import Array, Box, stream
 
 _COUNTS: Final = {"site": "nsite", "body": "nbody", "geom": "ngeom", "joint": "njnt"}

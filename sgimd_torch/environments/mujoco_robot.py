@@ -18,7 +18,6 @@ import numpy as np
 from mujoco import rollout
 from numpy.typing import ArrayLike
 
-from sgimd_torch.catalogue import unknown
 from sgimd_torch.environments.controllers import Controller
 from sgimd_torch.environments.motor_primitives import GaussianPrimitive
 from sgimd_torch.environments.mujoco_model import (
@@ -37,6 +36,7 @@ from sgimd_torch.environments.mujoco_model import (
 )
 from sgimd_torch.environments.protocol import Primitive, SimulationError, check_movement, check_robot
 from sgimd_torch.environments.sketch import Sketch
+from sgimd_torch.options.catalogue import unknown
 from sgimd_torch.spaces import Array, Box, check_count, check_point, check_rng, read_only, stream
 
 EXPLORED: Final = 300  # number of random movements that find T

@@ -12,10 +12,10 @@ from typing import Any, Final
 import numpy as np
 import torch
 
-from sgimd_torch.catalogue.options import hands_on
 from sgimd_torch.forward_model.anchored import Anchored
-from sgimd_torch.forward_model.shared import ThroughModel
+from sgimd_torch.forward_model.shared import ModelBased
 from sgimd_torch.inverses.locally_linear import LocallyLinear
+from sgimd_torch.options.signature import with_keywords_of
 from sgimd_torch.parts import Problem
 from sgimd_torch.spaces import Array, Estimate
 
@@ -27,7 +27,7 @@ _STEPS, _STEP = 40, 0.005
 _GOALS_PER_BATCH: Final = 64  # number of goals that are computed together, in about 50 MB
 
 
-class ModelInverse(ThroughModel):
+class ModelInverse(ModelBased):
     """Best result of gradient descents through the forward model.
 
     The descents start at the estimate of `LocallyLinear` and at the nearest remembered movements. Until the model is
@@ -38,7 +38,7 @@ class ModelInverse(ThroughModel):
         problem: problem to learn.
     """
 
-    @hands_on(ThroughModel)
+    @with_keywords_of(ModelBased)
     def __init__(self, problem: Problem, **options: Any) -> None:
         super().__init__(problem, **options)
         self.start = LocallyLinear(problem)

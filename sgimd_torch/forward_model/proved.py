@@ -14,11 +14,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from sgimd_torch.catalogue.options import hands_on
 from sgimd_torch.forward_model.inverse import ModelInverse
-from sgimd_torch.forward_model.shared import ThroughModel
+from sgimd_torch.forward_model.shared import ModelBased
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.memory import Memory
+from sgimd_torch.options.signature import with_keywords_of
 from sgimd_torch.parts import Inverse, Problem
 from sgimd_torch.spaces import Array, Estimate
 
@@ -31,7 +31,7 @@ _TINY: Final = np.finfo(float).tiny
 _MOST: Final = 10.0  # largest ratio of errors; ratios are clipped to [1/10, 10]
 
 
-class ProvedModel(ThroughModel):
+class ProvedModel(ModelBased):
     """Local Gaussian process; the forward model once it predicts as well (extra forward).
 
     The answers of the forward model are those of `ModelInverse`. The test is part of ``model.refresh``, so evaluations
@@ -41,10 +41,10 @@ class ProvedModel(ThroughModel):
         problem: problem to learn.
     """
 
-    @hands_on(ThroughModel)
+    @with_keywords_of(ModelBased)
     def __init__(self, problem: Problem, **options: Any) -> None:
         super().__init__(problem, **options)
-        self.process, self.through_model = LocalProcess(problem), ModelInverse(problem)
+        self.process, self.model_inverse = LocalProcess(problem), ModelInverse(problem)
         self._told = Memory(*problem.dims)
         earlier = problem.over(self._told)
         self._rivals = LocalProcess(earlier), ModelInverse(earlier)
@@ -73,17 +73,17 @@ class ProvedModel(ThroughModel):
 
     @property
     def _better(self) -> Inverse:
-        return self.through_model if self.trusted else self.process
+        return self.model_inverse if self.trusted else self.process
 
     def _test(self, memory: Memory, learnt: int) -> None:
         """Test model and process, which know the first ``learnt`` movements, on the later movements."""
         for row in range(len(self._told), learnt):
             self._told.add(memory.contexts[row], memory.thetas[row], memory.outcomes[row])
-        process, through_model = self._rivals
+        process, model_inverse = self._rivals
         new = slice(learnt, len(memory))
         contexts, thetas, outcomes = memory.contexts[new], memory.thetas[new], memory.outcomes[new]
         by_process = [process.predict_variance(*each) for each in zip(contexts, thetas, strict=True)]
-        by_model = through_model.predict_many(contexts, thetas)
+        by_model = model_inverse.predict_many(contexts, thetas)
         for row, (one, other, outcome) in enumerate(zip(by_process, by_model, outcomes, strict=True), learnt):
             if one is not None:
                 expected, variance = one

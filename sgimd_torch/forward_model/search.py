@@ -14,7 +14,7 @@ import numpy as np
 import torch
 
 from sgimd_torch.forward_model.anchored import Anchored
-from sgimd_torch.forward_model.shared import is_asked, model_of
+from sgimd_torch.forward_model.shared import model_of, uses_model
 from sgimd_torch.parts import Problem, Search
 from sgimd_torch.searches.simplex import NelderMead
 from sgimd_torch.spaces import Array, Estimate
@@ -50,7 +50,7 @@ class GradientSearch(Search):
 
     def __call__(self, start: Estimate, goal: Array) -> Generator[Array, Array, None]:
         """Movements near ``start``; each depends on the outcomes of earlier ones."""
-        if not is_asked(self.problem.inverse, self.model):
+        if not uses_model(self.problem.inverse, self.model):
             yield from self._simplex(start, goal)
             return
         policies = self.problem.policies

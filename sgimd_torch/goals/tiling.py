@@ -11,8 +11,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sgimd_torch.goals.checks import check_attempt, check_in
 from sgimd_torch.goals.regions import Progress, Region
+from sgimd_torch.goals.uniform import check_attempt, check_in
 from sgimd_torch.parts import Problem
 from sgimd_torch.spaces import Array, Box
 

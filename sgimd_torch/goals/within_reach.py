@@ -20,7 +20,7 @@ from sgimd_torch.parts import Problem
 from sgimd_torch.spaces import Array
 
 _FIRST: Final = 21  # least number of exemplars that determine a box; with fewer, goals are uniform in T
-_LOOKED_AT, _GROWTH = 1000, 1.05  # largest number of such exemplars; growth of the memory from one box to the next
+_MOST_COMPARED, _GROWTH = 1000, 1.05  # largest number of such exemplars; growth of the memory from one box to the next
 _ALIKE: Final = 5  # number of similar movements whose mean outcome counts; fewer while the memory is small
 _TAIL: Final = 0.02  # share of the mean outcomes that is left out at each end of a dimension
 _NARROWEST, _WIDEST = 0.02, 0.2  # bounds of the step, relative to the box's longest side; at first the step is wider
@@ -47,7 +47,7 @@ class WithinReach(UniformGoals):
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)
         self._reach: Array | None = None  # (2, outcome_dim), the box; None while all outcomes are equal
-        self._step, self._looked = _WIDEST, 0  # width of the step; number of exemplars when the box was computed
+        self._step, self._n_updated = _WIDEST, 0  # width of the step; number of exemplars when the box was computed
         self._missed = 0.0  # running median of the errors of goals in the box
         self._all_of_t = False  # whether T is hardly larger than the box with its widest step
 
@@ -59,8 +59,8 @@ class WithinReach(UniformGoals):
         """
         goal, space = super().sample(context), self.problem.outcomes
         n = len(self.problem.memory)
-        if n >= max(_FIRST, _GROWTH * self._looked):
-            self._look()
+        if n >= max(_FIRST, _GROWTH * self._n_updated):
+            self._update()
         if self._reach is None or self._all_of_t or self.problem.inverse.effects() is not None:
             return goal
         low, high = self._around(self._reach, self._step)
@@ -89,11 +89,11 @@ class WithinReach(UniformGoals):
             step = self._step * _FACTOR if met else self._step / _FACTOR ** (1 / 3)
             self._step = min(max(step, _NARROWEST), _WIDEST)
 
-    def _look(self) -> None:
+    def _update(self) -> None:
         """Update the box."""
         memory, space = self.problem.memory, self.problem.outcomes
-        n = self._looked = len(memory)
-        rows = np.arange(0, n, 1 + n // _LOOKED_AT)
+        n = self._n_updated = len(memory)
+        rows = np.arange(0, n, 1 + n // _MOST_COMPARED)
         alike = memory.neighbourhoods(rows, min(_ALIKE, n // _FIRST))
         means = memory.outcomes[alike].mean(axis=1)
         reach = np.quantile(means, (_TAIL, 1 - _TAIL), axis=0)
@@ -107,5 +107,5 @@ class WithinReach(UniformGoals):
     def _around(self, reach: Array, step: float) -> tuple[Array, Array]:
         """Low and high corners of the box that is widened by the step, within T."""
         low, high = reach
-        beyond = max(step, _FIRST / self._looked) * float((high - low).max())
+        beyond = max(step, _FIRST / self._n_updated) * float((high - low).max())
         return self.problem.outcomes.clip(low - beyond), self.problem.outcomes.clip(high + beyond)

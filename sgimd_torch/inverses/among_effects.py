@@ -7,10 +7,10 @@ outcome does not depend on theta. One process for both kinds of movements would 
 
 from __future__ import annotations
 
-from sgimd_torch.explore.effects import Effects
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.memory import Memory
 from sgimd_torch.parts import Inverse, Problem
+from sgimd_torch.searches.effects import Effects
 from sgimd_torch.spaces import Array, Estimate
 
 
@@ -47,3 +47,9 @@ class AmongEffects(Inverse):
     def effects(self) -> Memory | None:
         """Exemplars with an effect, see `Effects`."""
         return self._effects()
+
+
+def process_of(inverse: Inverse) -> LocalProcess:
+    """A local process of all exemplars, to predict any movement: that of the inverse model, or a new one."""
+    own = inverse.of_all if isinstance(inverse, AmongEffects) else inverse
+    return own if isinstance(own, LocalProcess) else LocalProcess(inverse.problem)

@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numba import njit
 
-from sgimd_torch.memory.jit import LISTS, NUMBER, NUMBERS, ROWS, TABLE, called, columns, inner, squared_distance
+from sgimd_torch.memory.jit import LISTS, NUMBER, NUMBERS, ROWS, TABLE, columns, compiled_for, inner, squared_distance
 from sgimd_torch.spaces import Array
 
 STEPS, STARTS = 4, 3  # number of Gauss-Newton steps from each start, and of exemplars where steps begin
@@ -85,7 +85,7 @@ def covariances(inputs: Array, kernel: Array, point: Array, covariance: Array, s
         covariance[j], slope[j] = value, scale**2 * by_distance
 
 
-@called(TABLE, NUMBERS)
+@compiled_for(TABLE, NUMBERS)
 def correlations(inputs: Array, kernel: Array) -> tuple[Array, Array]:
     """Covariance matrix ``(n, n)`` of ``inputs`` ``(dim, n)``, without noise, and its slopes, see `covariances`; the
     lower halves alone."""
@@ -233,7 +233,7 @@ def learnt_from(near: np.ndarray, alike: np.ndarray, n: int) -> np.ndarray:
     return rows
 
 
-@called(ROWS, LISTS, TABLE, TABLE, TABLE, NUMBERS, NUMBERS, NUMBERS, NUMBERS, TABLE, NUMBERS, TABLE)
+@compiled_for(ROWS, LISTS, TABLE, TABLE, TABLE, NUMBERS, NUMBERS, NUMBERS, NUMBERS, TABLE, NUMBERS, TABLE)
 def answer(
     near: np.ndarray,
     alike: np.ndarray,
@@ -302,13 +302,13 @@ def answer(
     return best, outcome, np.sqrt(max(1.0, surprise) * (variance + process.variance * noise))
 
 
-@called(TABLE, TABLE, ROWS, NUMBERS, NUMBERS)
+@compiled_for(TABLE, TABLE, ROWS, NUMBERS, NUMBERS)
 def foretell(inputs: Array, outcomes: Array, rows: np.ndarray, here: Array, kernel: Array) -> tuple[Array, float]:
     """Expected outcome of a movement, and its variance, by the process of the movements in ``rows``."""
     return prediction(fitted(columns(inputs, rows), columns(outcomes, rows), kernel), here.copy())
 
 
-@called(NUMBERS, NUMBERS, TABLE, NUMBERS, NUMBER)
+@compiled_for(NUMBERS, NUMBERS, TABLE, NUMBERS, NUMBER)
 def scores(diagonal: Array, beside: Array, outcomes: Array, noises: Array, stated: float) -> Array:
     """Log likelihoods ``(noises,)`` of movements with each noise, see `choose_kernel`.
 
@@ -337,7 +337,7 @@ def scores(diagonal: Array, beside: Array, outcomes: Array, noises: Array, state
     return found
 
 
-@called(TABLE, TABLE, TABLE, TABLE, NUMBER)
+@compiled_for(TABLE, TABLE, TABLE, TABLE, NUMBER)
 def gradient(inputs: Array, inverse: Array, weights: Array, slopes: Array, variance: float) -> tuple[Array, float]:
     """Derivatives of half the deviance (5.9 in Rasmussen & Williams) by log lengths ``(dim,)``, and by the noise.
 

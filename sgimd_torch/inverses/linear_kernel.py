@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from sgimd_torch.memory.jit import LISTS, NUMBERS, TABLE, called, columns, inner, squared_distance
+from sgimd_torch.memory.jit import LISTS, NUMBERS, TABLE, columns, compiled_for, inner, squared_distance
 from sgimd_torch.spaces import Array
 
 ALPHA, WIDTH = 0.5, 1.0  # weight of a neighbourhood's spread in eq. (8), and width of the Gaussian of eq. (9)
@@ -26,7 +26,7 @@ def spread(outcomes: Array) -> float:
     return np.sqrt(total / (n - 1))
 
 
-@called(LISTS, TABLE, TABLE, NUMBERS, TABLE)
+@compiled_for(LISTS, TABLE, TABLE, NUMBERS, TABLE)
 def locally_linear(alike: np.ndarray, thetas: Array, outcomes: Array, goal: Array, box: Array) -> tuple[int, Array]:
     """The answer of `LocallyLinear`: the number of the best neighbourhood, and theta.
 

@@ -31,6 +31,8 @@ class LocalInverse(Inverse):
         ValueError: ``width`` is not positive.
     """
 
+    says_how_sure = False
+
     def __init__(
         self,
         problem: Problem,

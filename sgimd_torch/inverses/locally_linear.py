@@ -32,6 +32,8 @@ class LocallyLinear(Inverse):
         problem: problem to learn.
     """
 
+    says_how_sure = False
+
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)
         self._memory, self._radius = problem.memory, 0.6 * np.sqrt(problem.policies.dim / 25)  # as `LocalInverse`

@@ -23,6 +23,8 @@ class NearestNeighbour(Inverse):
         ValueError: ``k`` is not a whole number, or below 1.
     """
 
+    says_how_sure = False
+
     def __init__(self, problem: Problem, *, k: int = 10) -> None:
         super().__init__(problem)
         self.k = check_count("k", k, 1)

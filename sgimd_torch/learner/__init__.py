@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sgimd_torch.learner.events import Change, Event, Kind
-from sgimd_torch.learner.places import Place
+from sgimd_torch.learner.slots import RobotSlot
 from sgimd_torch.parts import Inverse, Problem, Social, Strategy
 from sgimd_torch.spaces import Array, Demonstration, Failure, Lesson, Move, Request, check_point, read_only
 
@@ -34,7 +34,7 @@ class Watcher(Protocol):
     def expect(self, context: Array, theta: Array, outcome: Array) -> None:
         """Compare an outcome, which is not in memory yet, with what is expected."""
 
-    def look(self) -> tuple[Learner, Change | None] | None:
+    def restart_if_changed(self) -> tuple[Learner, Change | None] | None:
         """A learner to go on as, and the change if a new one was noticed; None to go on."""
 
 
@@ -79,9 +79,11 @@ class Learner:
         self.watcher: Watcher | None = None
         self.changes: list[Change] = []
         self._life: list[tuple[int, int] | Event] = []  # events; for a movement, its row in memory and its place
-        self._places = [Place(0)]
-        self._new: list[Place] = []  # places whose attempt no event has reported so far, in order of beginning
-        self._asked: list[tuple[Place, Move | Failure | None]] = []  # what was asked for last and is not told so far
+        self._places = [RobotSlot(0)]
+        self._new: list[RobotSlot] = []  # places whose attempt no event has reported so far, in order of beginning
+        self._asked: list[
+            tuple[RobotSlot, Move | Failure | None]
+        ] = []  # what was asked for last and is not told so far
         self._lessons: set[tuple[bytes, bytes]] = set()
 
     @property
@@ -253,14 +255,14 @@ class Learner:
         told = [self._checked(move, outcome) for (_, move), outcome in zip(asked, outcomes, strict=True)]
         moves = [move if isinstance(move, Move) else None for _, move in asked]
         # A failure without a movement leaves no trace of the attempt, so its beginning is reported by itself.
-        traceless = [move is None and isinstance(each, Failure) for move, each in zip(moves, told, strict=True)]
-        self._report_new(*(place for (place, _), each in zip(asked, traceless, strict=True) if not each))
+        no_attempt_begun = [move is None and isinstance(each, Failure) for move, each in zip(moves, told, strict=True)]
+        self._report_new(*(place for (place, _), each in zip(asked, no_attempt_begun, strict=True) if not each))
         self._asked = []
         for (place, _), move, outcome in zip(asked, moves, told, strict=True):
             self._tell(place, move, outcome)
-        self._look()
+        self._restart_if_changed()
 
-    def amend(self, theta: Array, *, place: int = 0) -> None:
+    def replace_theta(self, theta: Array, *, place: int = 0) -> None:
         """Replace the movement that is asked for at ``place`` by the recorded ``theta``, which equals it but for
         rounding. Only a replay does this: the memory then holds what was executed."""
         here, move = self._asked[place]
@@ -318,7 +320,7 @@ class Learner:
         self._report_new()
         self._remember(context, theta, outcome)
         self._publish(Event(Kind.ADDED, context, theta, outcome=outcome))
-        self._look()
+        self._restart_if_changed()
 
     def translate(self, demonstration: Demonstration) -> Array:
         """theta_d, eq. (6): the policy that corresponds to a demonstration.
@@ -372,17 +374,17 @@ class Learner:
             place.end()
         self._publish(*(stopped or [Event(Kind.INTERRUPTED, place=-1)]))
 
-    def _place(self, number: int) -> Place:
+    def _place(self, number: int) -> RobotSlot:
         while len(self._places) <= number:
-            self._places.append(Place(len(self._places)))
+            self._places.append(RobotSlot(len(self._places)))
         return self._places[number]
 
-    def _begin(self, place: Place, context: Array) -> None:
+    def _begin(self, place: RobotSlot, context: Array) -> None:
         context = read_only(context)
         self._new.append(place)
         place.begin(self.autonomous.attempt(context), context)
 
-    def _propose(self, place: Place, context: Array | Failure) -> Move | Failure | None:
+    def _propose(self, place: RobotSlot, context: Array | Failure) -> Move | Failure | None:
         """The next movement at a place; a new attempt begins if none is under way there."""
         if isinstance(context, Failure):
             return context
@@ -416,7 +418,7 @@ class Learner:
             raise ValueError(f"a movement has an outcome or a Failure, a rest has None; got {outcome} for {move}")
         return move
 
-    def _tell(self, place: Place, move: Move | None, outcome: Array | Failure | None) -> None:
+    def _tell(self, place: RobotSlot, move: Move | None, outcome: Array | Failure | None) -> None:
         """Tell what came of the movement at one place, after its check."""
         self.movements += 1
         if isinstance(outcome, Failure):
@@ -442,9 +444,9 @@ class Learner:
         if self.problem.memory is not self.memory:
             self.problem.memory.add(context, theta, outcome)
 
-    def _look(self) -> None:
+    def _restart_if_changed(self) -> None:
         """Begin again if the robot has changed: attempts end, and all parts are built anew."""
-        found = None if self.watcher is None else self.watcher.look()
+        found = None if self.watcher is None else self.watcher.restart_if_changed()
         if found is None:
             return
         for place in self._places:
@@ -461,12 +463,12 @@ class Learner:
             for listener in self.listeners:
                 listener(event)
 
-    def _report_new(self, *reported: Place) -> None:
+    def _report_new(self, *reported: RobotSlot) -> None:
         """Publish the beginnings of new attempts, unless the next events, at the places ``reported``, tell them."""
         begun, self._new = self._begun(reported), []
         self._publish(*begun)
 
-    def _begun(self, reported: Sequence[Place]) -> list[Event]:
+    def _begun(self, reported: Sequence[RobotSlot]) -> list[Event]:
         """Events of all new attempts; none if events at the places ``reported`` tell all of them in their order.
 
         A replay begins attempts in the order of the events, so that each draws the same random numbers again.

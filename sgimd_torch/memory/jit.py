@@ -17,7 +17,7 @@ LISTS = types.Array(types.int64, 2, "C", readonly=True)
 SEEN, FOUND, SQUARED = (types.Array(kind, dim, "C") for kind, dim in ((types.int64, 1), (types.int64, 2), (NUMBER, 2)))
 
 
-def called(*arguments: types.Type) -> Any:
+def compiled_for(*arguments: types.Type) -> Any:
     """Decorator of a function that Python calls. Its types are given, so it is compiled when this module is loaded."""
     return njit(tuple(arguments), cache=True, nogil=True, fastmath=_FAST)
 

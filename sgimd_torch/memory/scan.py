@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 from numba import types
 
-from sgimd_torch.memory.jit import FOUND, ROWS, SEEN, SQUARED, TABLE, called, inner
+from sgimd_torch.memory.jit import FOUND, ROWS, SEEN, SQUARED, TABLE, compiled_for, inner
 from sgimd_torch.spaces import Array
 
 _BLOCK: Final = 128  # number of rows that stay in the cache while all queries are compared with them
@@ -34,7 +34,7 @@ def _compare(keys: Array, first: int, end: int, query: Array, rows: np.ndarray, 
             rows[place], squared[place] = row, distance
 
 
-@called(TABLE, types.int64, TABLE, FOUND, SQUARED)
+@compiled_for(TABLE, types.int64, TABLE, FOUND, SQUARED)
 def scan(keys: Array, first: int, queries: Array, rows: np.ndarray, squared: Array) -> None:
     """Add rows to lists of the rows nearest to some queries; of equally near rows the older stays first.
 
@@ -50,7 +50,7 @@ def scan(keys: Array, first: int, queries: Array, rows: np.ndarray, squared: Arr
             _compare(keys, begin, min(begin + _BLOCK, len(keys)), queries[m], rows[m], squared[m])
 
 
-@called(TABLE, ROWS, SEEN, FOUND, SQUARED)
+@compiled_for(TABLE, ROWS, SEEN, FOUND, SQUARED)
 def scan_around(keys: Array, asked: np.ndarray, seen: np.ndarray, rows: np.ndarray, squared: Array) -> None:
     """Bring the lists of the rows ``asked`` up to date.
 

@@ -102,7 +102,7 @@ def replay(
                 for each in group:
                     if _check_move(learner, each, index + each.place, moves[each.place]):
                         assert each.theta is not None
-                        learner.amend(each.theta, place=each.place)
+                        learner.replace_theta(each.theta, place=each.place)
                         if not rounded:
                             warnings.warn(_ROUNDED.format(index + each.place), RuntimeWarning, stacklevel=2)
                         rounded = True

@@ -13,7 +13,7 @@ import warnings
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.goals.checks import check_attempt, check_in
+from sgimd_torch.goals.uniform import check_attempt, check_in
 from sgimd_torch.parts import Goals, Problem
 from sgimd_torch.spaces import Array, check_count
 

@@ -17,12 +17,12 @@ from pathlib import Path
 from typing import Any, Final
 
 import sgimd_torch
-from sgimd_torch.catalogue import function_of
 from sgimd_torch.environments.protocol import Environment, FromFiles
 from sgimd_torch.files import checksum, make_folder
+from sgimd_torch.options.build import RunParts
+from sgimd_torch.options.catalogue import function_of
+from sgimd_torch.options.config import EVALUATES, MAY_CHANGE, PLACE, Config, code_of, differ, words
 from sgimd_torch.record import Dims, Record, RunError
-from sgimd_torch.runs.build import RunParts
-from sgimd_torch.runs.config import EVALUATES, MAY_CHANGE, PLACE, Config, code_of, differ, words
 
 FILE: Final = "run.sqlite"
 LONGEST: Final = 504  # bytes, longest path of a file that SQLite opens

@@ -2,23 +2,29 @@
 
 evaluations = Evaluations(build(config), record)
 evaluations.after(500)["own"].mean_error
+
+``sgimd run --until`` ends a run early, once its learner expects small errors, see `ends_now`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from sgimd_torch.evaluation import Evaluation, evaluate
+from sgimd_torch.evaluation import Evaluation, evaluate, expected_errors, tile_goals, tile_side
+from sgimd_torch.options.build import RunParts
+from sgimd_torch.options.config import OWN
+from sgimd_torch.parts import Inverse
 from sgimd_torch.record import Record
-from sgimd_torch.runs.build import RunParts
-from sgimd_torch.runs.config import OWN
+from sgimd_torch.spaces import Array, stream
 
 if TYPE_CHECKING:
     from sgimd_torch.goals.regions import Region
+
+LOOK_EVERY: Final = 50  # number of movements between two looks at the expected error, until it is a tenth of all
 
 ByInverse = Mapping[str, Evaluation]
 """The evaluation of each inverse model, by name, the run's own inverse model first."""
@@ -58,7 +64,7 @@ class Evaluations:
 
     def size(self, movements: int) -> int:
         """Number of movements of the evaluation after this number of ``movements``."""
-        different = len(set(map(id, self.parts.answers.values())))
+        different = len(set(map(id, self.parts.inverses.values())))
         return len(self.parts.benchmark.goals) * (different + self._repeats(movements))
 
     def after(self, movements: int) -> ByInverse | None:
@@ -77,7 +83,7 @@ class Evaluations:
 
         At each goal the noise is the same for all inverse models. The noise floor is measured for the run's own model.
         """
-        inverses, repeats = self.parts.answers, self._repeats(movements)
+        inverses, repeats = self.parts.inverses, self._repeats(movements)
         own, *others = inverses
         parts = self.parts
         judged: tuple[Any, ...] = parts.environment, parts.benchmark.goals, parts.config.seed, movements
@@ -117,3 +123,39 @@ def _fields(region: Region) -> Iterator[Any]:
     yield region.path
     yield from (*region.low, *region.high)
     yield from (region.attempts, n, float(region.competences.mean()) if n else np.nan, float(region.interest()))
+
+
+def ends_now(parts: RunParts, record: Record, movements: int) -> bool:
+    """Whether the learner expects no larger error than --until says; it looks now and then. The record keeps it."""
+    config, learner = parts.config, parts.learner
+    if record.about["met"] is not None:
+        return True
+    moments = range(0, movements + 1, LOOK_EVERY * max(1, movements // (10 * LOOK_EVERY)))[1:]
+    if not (config.due(movements, moments) and len(learner.memory)):
+        return False
+    known = parts.task.benchmark is not None or config.benchmark is not None
+    goals = parts.benchmark.goals if known else None
+    expected = expected_error(learner.inverse, goals, stream(config.seed, "until", movements))
+    assert config.until is not None
+    if expected <= config.until:  # not if it is NaN
+        record.settle(met=[movements, expected])
+        return True
+    return False
+
+
+def expected_error(inverse: Inverse, goals: Array | None, rng: np.random.Generator) -> float:
+    """Mean error that an inverse model expects at ``goals``, each in a remembered context.
+
+    Args:
+        inverse: inverse model, whose ``answer_many`` is called; its memory must not be empty.
+        goals: ``(n, outcome_dim)``, in the unit of T; None: one in each tile of T with two remembered outcomes or more.
+        rng: random stream of contexts and goals.
+
+    Returns:
+        Mean error, in the unit of T; NaN: there are no goals, or the inverse model does not say how sure it is.
+    """
+    memory, box = inverse.problem.memory, inverse.problem.outcomes
+    if goals is None:
+        goals = tile_goals(memory.outcomes, box, tile_side(memory.outcomes, box), rng)
+    contexts = memory.contexts[rng.integers(len(memory), size=len(goals))]
+    return float(expected_errors(inverse.answer_many(contexts, goals), goals).mean()) if len(goals) else float("nan")

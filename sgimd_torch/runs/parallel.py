@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import Final
 
 from sgimd_torch.files import make_folder
-from sgimd_torch.runs.config import Config, words
-from sgimd_torch.runs.process import Failed, Progress, Stopped, Stopping
+from sgimd_torch.options.config import Config, words
 from sgimd_torch.runs.read import movements_on_disk
+from sgimd_torch.runs.signals import Failed, Progress, Stopped, Stopping
 
 POLL: Final = 0.05  # s between two looks at the processes
 REFRESH: Final = 20  # looks at the processes between two looks at the movements on disk

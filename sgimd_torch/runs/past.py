@@ -12,11 +12,11 @@ from typing import Final
 
 import numpy as np
 
-from sgimd_torch.catalogue.options import read
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.files import check_regular
 from sgimd_torch.learner.events import Kind
 from sgimd_torch.memory import Memory
+from sgimd_torch.options.signature import parsed
 from sgimd_torch.record import Record, RunError
 from sgimd_torch.spaces import Array, Box, check_vector
 
@@ -83,7 +83,7 @@ def _listed(path: Path, robot: Environment) -> Iterator[Exemplar]:
         raise RunError(f"{path} {why}; this robot needs {', '.join(each for names in wanted for each in names)}")
     for number, row in enumerate(rows, 2):
         try:
-            context, theta, outcome = (np.array([read(row[each] or "", float) for each in names]) for names in wanted)
+            context, theta, outcome = (np.array([parsed(row[each] or "", float) for each in names]) for names in wanted)
         except ValueError as error:
             raise RunError(f"{path}: line {number} is no movement of {sum(map(len, wanted))} numbers") from error
         yield context, theta, outcome

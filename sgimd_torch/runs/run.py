@@ -1,6 +1,6 @@
 """One run: replay its record, make new movements, evaluate now and then. Listeners do everything else.
 
-print(carry_out(build(Config(seed=3)), stopping, resume=False, accept_loss=False, again="sgimd run --seed 3 --resume"))
+print(run_one(build(Config(seed=3)), stopping, resume=False, accept_loss=False, again="sgimd run --seed 3 --resume"))
 """
 
 from __future__ import annotations
@@ -12,17 +12,17 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import partial
-from typing import Final, Protocol, Self
+from typing import Final, Protocol, Self, runtime_checkable
 
 from sgimd_torch.environments.protocol import FAILURES, SimulationError
 from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.learner.events import Event, Kind
+from sgimd_torch.options.build import RunParts
 from sgimd_torch.record import ReplayError, RunError
 from sgimd_torch.runs.at_once import executing
-from sgimd_torch.runs.build import RunParts
 from sgimd_torch.runs.directory import open_run
-from sgimd_torch.runs.evaluations import Evaluations
-from sgimd_torch.runs.process import Failed, Progress, Stopped, Stopping, say
+from sgimd_torch.runs.evaluations import Evaluations, ends_now
+from sgimd_torch.runs.signals import Failed, Progress, Stopped, Stopping, say
 from sgimd_torch.session import NoOutcomeError, reason_of, run
 from sgimd_torch.spaces import Episode
 
@@ -30,7 +30,7 @@ TOLD: Final = 3  # first failures, with a message each; later ones are only coun
 COMMIT_EVERY: Final = 1.0  # s between two commits; a killed run loses the movements since the last commit
 
 
-def carry_out(parts: RunParts, stopping: Stopping, *, resume: bool, accept_loss: bool, again: str) -> str:
+def run_one(parts: RunParts, stopping: Stopping, *, resume: bool, accept_loss: bool, again: str) -> str:
     """Make a run, or go on with one, and return its result as one line.
 
     Args:
@@ -45,7 +45,7 @@ def carry_out(parts: RunParts, stopping: Stopping, *, resume: bool, accept_loss:
         Failed: the run failed after its beginning.
         Stopped: a signal stopped the run.
     """
-    with Life(parts, resume=resume, accept_loss=accept_loss) as life:
+    with RunLoop(parts, resume=resume, accept_loss=accept_loss) as life:
         try:
             life.go_on(stopping)
         except Stopped:
@@ -64,13 +64,13 @@ def carry_out(parts: RunParts, stopping: Stopping, *, resume: bool, accept_loss:
         return life.summary
 
 
-class Life:
+class RunLoop:
     """A run under way. Each movement is recorded, then told to the listeners; then there may be an evaluation.
 
     It is a context manager. Leaving it writes the last movements to the disk, except after Ctrl-C.
 
     Args:
-        parts, resume, accept_loss: arguments of ``carry_out``.
+        parts, resume, accept_loss: arguments of ``run_one``.
 
     Attributes:
         record: record of the run; new movements are written to it after the replay.
@@ -88,7 +88,9 @@ class Life:
         self.seconds = Seconds(self.record.about.get("seconds", {}))
         self.evaluations = Evaluations(parts, self.record)
         parts.learner.listeners.append(self._hear)
-        self.listeners: list[Listener] = [each.listener(self) for each in parts.learner.problem.trained]
+        self.listeners: list[Listener] = [
+            part.listener(self) for part in parts.learner.problem.trained if isinstance(part, Listening)
+        ]
         if parts.config.board:
             from sgimd_torch.board.listener import BoardListener  # loaded here, as most runs have no board
 
@@ -254,8 +256,6 @@ class Life:
         config = self.parts.config
         if config.until is None or self.replaying or not self._all_told or self.movements >= config.movements:
             return False
-        from sgimd_torch.runs.until import ends_now  # loaded here, as few runs end early
-
         with self.seconds.of("learner"):
             ends = ends_now(self.parts, self.record, self.movements)
         if ends and config.evaluations:
@@ -309,6 +309,14 @@ class Listener(Protocol):
     def close(self) -> None:
         """The run has ended, or was stopped."""
         return
+
+
+@runtime_checkable
+class Listening(Protocol):
+    """A trained part of a learner that has a listener in a run."""
+
+    def listener(self, life: RunLoop) -> Listener:
+        """The listener in the run ``life``."""
 
 
 class Seconds:

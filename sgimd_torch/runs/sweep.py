@@ -29,11 +29,11 @@ from pathlib import Path
 from typing import Final, NamedTuple, TypeVar
 
 from sgimd_torch.files import make_folder
-from sgimd_torch.runs.command_line import parse
-from sgimd_torch.runs.config import Config, dashed
+from sgimd_torch.options.command_line import parse
+from sgimd_torch.options.config import Config, dashed
 from sgimd_torch.runs.parallel import sweep
-from sgimd_torch.runs.process import loading, parser_of, say
 from sgimd_torch.runs.read import finished, movements_on_disk
+from sgimd_torch.runs.signals import loading, parser_of, say
 
 Item = TypeVar("Item")
 NOT_VARIED: Final = {
@@ -58,10 +58,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     options, rest = parser().parse_known_args(argv)
     variants, flags = variants_of(options.vary, rest)
     configs = [replace(variant, seed=seed) for seed in options.seeds for variant in variants]
-    return carry_out(configs, options, flags, variants[0].out)
+    return run_all(configs, options, flags, variants[0].out)
 
 
-def carry_out(whole: Sequence[Config], options: argparse.Namespace, flags: Sequence[str], out: Path) -> int:
+def run_all(whole: Sequence[Config], options: argparse.Namespace, flags: Sequence[str], out: Path) -> int:
     """Carry out the unfinished runs of a study, or list them; return the exit code, which is 1 if runs failed.
 
     Args:
@@ -82,7 +82,7 @@ def carry_out(whole: Sequence[Config], options: argparse.Namespace, flags: Seque
     if options.dry_run or not left:
         return 0
     with loading():
-        from sgimd_torch.runs.build import build  # imported here so that --help is fast
+        from sgimd_torch.options.build import build  # imported here so that --help is fast
     for config in {each.directory.parent: each for each in left}.values():
         build(config)  # wrong options raise an error before any run starts
     make_folder(out)

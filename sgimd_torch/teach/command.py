@@ -21,12 +21,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
+from sgimd_torch.options.command_line import parse
+from sgimd_torch.options.config import Config
 from sgimd_torch.record import ReplayError
-from sgimd_torch.runs.command_line import parse
-from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.directory import with_found_earlier
-from sgimd_torch.runs.process import Failed, loading, parser_of, say
 from sgimd_torch.runs.read import config_of, read_run
+from sgimd_torch.runs.signals import Failed, loading, parser_of, say
 from sgimd_torch.session import NoOutcomeError
 from sgimd_torch.teach.by_hand import BY_HAND
 

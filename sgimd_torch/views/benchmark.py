@@ -25,8 +25,8 @@ from pathlib import Path
 import numpy as np
 
 from sgimd_torch.evaluation import TILES, Benchmark, save_benchmark, tile_goals, tile_side, tile_sides
-from sgimd_torch.runs.process import parser_of, say
 from sgimd_torch.runs.read import Run, find_runs, read_run
+from sgimd_torch.runs.signals import parser_of, say
 from sgimd_torch.spaces import Box, check_count, stream
 
 

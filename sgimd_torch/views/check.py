@@ -33,9 +33,9 @@ import numpy as np
 
 from sgimd_torch.environments.check import check_environment
 from sgimd_torch.environments.protocol import Environment, execute_many
-from sgimd_torch.runs.build import task_of
-from sgimd_torch.runs.command_line import parse
-from sgimd_torch.runs.process import parser_of
+from sgimd_torch.options.build import task_of
+from sgimd_torch.options.command_line import parse
+from sgimd_torch.runs.signals import parser_of
 from sgimd_torch.runs.tasks import Task, benchmark_of
 from sgimd_torch.runs.tasks.taught import demonstrations_of
 from sgimd_torch.spaces import check_count, stream

@@ -26,13 +26,13 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Final
 
-from sgimd_torch.catalogue import ROD
 from sgimd_torch.figures.names import label
-from sgimd_torch.runs.command_line import parse
-from sgimd_torch.runs.config import Config
+from sgimd_torch.options.catalogue import ROD
+from sgimd_torch.options.command_line import parse
+from sgimd_torch.options.config import Config
 from sgimd_torch.runs.parallel import sweep
-from sgimd_torch.runs.process import Failed, loading, parser_of, say
 from sgimd_torch.runs.read import finished, read_run
+from sgimd_torch.runs.signals import Failed, loading, parser_of, say
 
 LEARNERS: Final = {
     "random": "makes random movements",
@@ -52,7 +52,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     configs = configs_of(rest)
     with loading():  # a missing extra is reported before the runs, not after them
         from sgimd_torch.figures.save import save_figure
-        from sgimd_torch.runs.build import build
+        from sgimd_torch.options.build import build
         from sgimd_torch.views import table
         from sgimd_torch.views.report.figures import figure_of_curves
         from sgimd_torch.views.variants import Variant

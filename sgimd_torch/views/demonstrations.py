@@ -39,9 +39,9 @@ from sgimd_torch.demonstrations.text import read_text
 from sgimd_torch.demonstrations.units import in_units, paced
 from sgimd_torch.environments.protocol import SimulationError, execute_many, primitive_of
 from sgimd_torch.files import check_regular
-from sgimd_torch.runs.build import task_of
-from sgimd_torch.runs.command_line import parse
-from sgimd_torch.runs.process import parser_of, say, typed
+from sgimd_torch.options.build import task_of
+from sgimd_torch.options.command_line import parse
+from sgimd_torch.runs.signals import parsed_argument, parser_of, say
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.runs.tasks.taught import Replaying, theta_of
 from sgimd_torch.spaces import Array, Box, Demonstration, stream
@@ -278,7 +278,7 @@ def _units(text: str) -> dict[str, str]:
 
 
 def _above_zero(text: str) -> float:
-    value = typed(text, float)
+    value = parsed_argument(text, float)
     if not 0 < value < np.inf:
         raise argparse.ArgumentTypeError(f"must be above 0, got {text}")
     return value

@@ -27,10 +27,10 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
+from sgimd_torch.options.config import MAY_CHANGE
 from sgimd_torch.record import RunError
-from sgimd_torch.runs.config import MAY_CHANGE
-from sgimd_torch.runs.process import parser_of, say
 from sgimd_torch.runs.read import Run
+from sgimd_torch.runs.signals import parser_of, say
 from sgimd_torch.views.results import Column, results
 from sgimd_torch.views.statistics import LEAST_SEEDS
 from sgimd_torch.views.text_table import print_csv, print_latex, print_table

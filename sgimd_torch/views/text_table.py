@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import Final
 
-from sgimd_torch.runs.process import printable
+from sgimd_torch.runs.signals import printable
 
 _LATEX: Final = {
     **{sign: f"\\{sign}" for sign in "&%$#_{}"},

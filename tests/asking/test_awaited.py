@@ -6,9 +6,9 @@ import signal
 import pytest
 
 from runs import LIVE, end, stopped
-from sgimd_torch.runs.command_line import main
-from sgimd_torch.runs.process import command
+from sgimd_torch.options.command_line import main
 from sgimd_torch.runs.read import read_run
+from sgimd_torch.runs.signals import command
 
 STUCK = '''
 import os, signal, threading

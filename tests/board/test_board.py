@@ -24,10 +24,10 @@ from sgimd_torch.board.events import EventFile
 from sgimd_torch.board.legend import LEGEND
 from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.figures.sections import sections
+from sgimd_torch.options.command_line import main
 from sgimd_torch.runs import sweep
-from sgimd_torch.runs.command_line import main
-from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
+from sgimd_torch.runs.signals import command
 from sgimd_torch.spaces import Box, Demonstration, Episode, Move, Request
 from worlds import problem
 

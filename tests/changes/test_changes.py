@@ -16,8 +16,10 @@ from sgimd_torch.evaluation import evaluate
 from sgimd_torch.forward_model.search import GradientSearch
 from sgimd_torch.inverses.local import LocalInverse
 from sgimd_torch.inverses.local_process import LocalProcess
+from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.learner.events import Kind
-from sgimd_torch.record.lives import load_life, save_life
+from sgimd_torch.parts import Inverse
+from sgimd_torch.record.saving import load_life, save_life
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Failure, stream
 from sgimd_torch.teachers import PeriodicTeacher
@@ -194,6 +196,23 @@ def test_a_simulator_helps_as_far_as_it_is_right(change):
         assert len(helped.memory) == 60
         ratios.append(error(helped, ARM) / error(alone, ARM))
     assert np.exp(np.log(ratios).mean()) < (1.03 if change == "mirrored" else 0.5)
+
+
+class Sure(Inverse):
+    """Nearest exemplar, which expects its outcome again."""
+
+    def __call__(self, context, goal):
+        estimate = NearestNeighbour(self.problem)(context, goal)
+        return estimate._replace(expected=estimate.outcomes[0], sd=0.1)
+
+
+def test_a_change_is_noticed_with_any_inverse_model_that_says_how_sure_it_is():
+    robot = Changing(ARM, "reversed", 200)
+    learner = sagg_riac(robot, 3, inverse=Sure)
+    live(learner, robot, 260)
+    (change,) = learner.changes
+    assert 198 <= change.since <= 204
+    assert isinstance(learner.inverse, Sure)
 
 
 def test_memory_and_prior_together_are_refused():

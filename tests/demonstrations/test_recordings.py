@@ -14,7 +14,7 @@ from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
 from sgimd_torch.demonstrations.columns import Columns
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.protocol import SimulationError
-from sgimd_torch.runs.process import command
+from sgimd_torch.runs.signals import command
 from sgimd_torch.spaces import Demonstration
 
 ARM = PlanarArm(7)

@@ -23,13 +23,13 @@ def text_of(page):
 def anchors(page):
     """Of its headings, as code hosts make them: small letters, no punctuation, a dash for each space."""
     headings = re.findall(r"^#{1,6} (.*)$", FENCED.sub("", text_of(page)), re.MULTILINE)
-    seen, found = Counter(), set()
+    seen, names = Counter(), set()
     for heading in headings:
         words = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading).lower()
         anchor = re.sub(r"[^\w\- ]", "", words).strip().replace(" ", "-")
-        found.add(f"{anchor}-{seen[anchor]}" if seen[anchor] else anchor)
+        names.add(f"{anchor}-{seen[anchor]}" if seen[anchor] else anchor)
         seen[anchor] += 1
-    return found
+    return names
 
 
 @pytest.mark.parametrize("page", PAGES)
@@ -53,26 +53,26 @@ def test_files_that_a_page_names_exist(page):
 
 def test_the_index_names_every_page_of_docs_once():
     listed = re.findall(r"^- \[.*?\]\((.*?)\): ", text_of("docs/README.md"), re.MULTILINE)
-    there = {path.relative_to(ROOT / "docs").as_posix() for path in (ROOT / "docs").rglob("*.md")} - {"README.md"}
-    assert sorted(link for link in listed if not link.startswith("../")) == sorted(there)
+    pages = {path.relative_to(ROOT / "docs").as_posix() for path in (ROOT / "docs").rglob("*.md")} - {"README.md"}
+    assert sorted(link for link in listed if not link.startswith("../")) == sorted(pages)
 
 
 def test_the_navigation_has_every_page_once():
     def pages(entry):
         if isinstance(entry, str):
             return [entry]
-        return [page for each in (entry.values() if isinstance(entry, dict) else entry) for page in pages(each)]
+        return [page for part in (entry.values() if isinstance(entry, dict) else entry) for page in pages(part)]
 
     listed = pages(tomllib.loads((HERE / "zensical.toml").read_text(encoding="utf-8"))["project"]["nav"])
-    shown = [re.sub(r"\.ipynb$", ".md", name) for name in COPIES if name.endswith((".md", ".ipynb"))]
-    assert sorted(listed) == sorted([*shown, "names.md"])
+    made = [re.sub(r"\.ipynb$", ".md", name) for name in COPIES if name.endswith((".md", ".ipynb"))]
+    assert sorted(listed) == sorted([*made, "names.md"])
 
 
 @pytest.mark.parametrize("page", [page for page in PAGES if QUOTE.search(text_of(page))])
 def test_what_a_page_quotes_of_the_code_stands_there_in_this_order(page):
     for path, quoted in QUOTE.findall(text_of(page)):
-        there = [line.strip() for line in text_of(path).splitlines()]
+        source = [line.strip() for line in text_of(path).splitlines()]
         for line in quoted.splitlines():
             if line.strip() not in ("", "..."):
-                assert line.strip() in there, f"{path} has no such line after the ones before: {line}"
-                there = there[there.index(line.strip()) + 1 :]
+                assert line.strip() in source, f"{path} has no such line after the ones before: {line}"
+                source = source[source.index(line.strip()) + 1 :]

@@ -17,13 +17,13 @@ def read(name):
     return nbformat.read(FOLDER / f"{name}.ipynb", as_version=4)
 
 
-@pytest.mark.parametrize("name", [pytest.param(each, marks=[pytest.mark.slow] * (each in SLOW)) for each in NAMES])
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name in SLOW)) for name in NAMES])
 def test_a_notebook_works_from_top_to_bottom(name, tmp_path):
     notebook = read(name)
-    shown = [kinds(cell) for cell in codes(notebook)]
+    stored = [kinds(cell) for cell in codes(notebook)]
     # A cell that raises ends it with CellExecutionError.
     NotebookClient(notebook, timeout=900, kernel_name="python3", resources={"metadata": {"path": tmp_path}}).execute()
-    assert [kinds(cell) for cell in codes(notebook)] == shown  # printed text and pictures in the same places
+    assert [kinds(cell) for cell in codes(notebook)] == stored  # printed text and pictures in the same places
 
 
 def codes(notebook):
@@ -32,32 +32,23 @@ def codes(notebook):
 
 def kinds(cell):
     """What a cell has shown: "stdout", "stderr", or the kinds of data of a picture."""
-    return {each.get("name") or ",".join(sorted(each.data)) for each in cell.outputs}
+    return {output.get("name") or ",".join(sorted(output.data)) for output in cell.outputs}
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_the_stored_outputs_are_of_one_run_of_all_cells_and_small(name):
-    notebook = read(name)
+def test_what_is_stored_is_of_one_run_of_all_cells_small_and_knows_nothing_of_the_machine(name):
+    notebook, text = read(name), (FOLDER / f"{name}.ipynb").read_text(encoding="utf-8")
     nbformat.validate(notebook)
+    assert {*notebook.metadata} == {"kernelspec", "language_info"}
+    assert notebook.metadata.kernelspec.name == "python3"
+    assert not any(word in text for word in ("/home/", "/root/", "/tmp/", "/Users/", "http://"))
     assert [cell.execution_count for cell in codes(notebook)] == list(range(1, len(codes(notebook)) + 1))
     outputs = [output for cell in codes(notebook) for output in cell.outputs]
     assert {output.output_type for output in outputs} <= {"stream", "display_data", "execute_result"}  # no error
     assert {output.name for output in outputs if output.output_type == "stream"} == {"stdout"}  # no warning
     pictures = [output.data["image/png"] for output in outputs if "image/png" in output.get("data", {})]
     assert 0 < max(len(base64.b64decode(picture)) for picture in pictures) < 100_000
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_a_notebook_knows_nothing_of_the_machine_that_made_it(name):
-    notebook, text = read(name), (FOLDER / f"{name}.ipynb").read_text(encoding="utf-8")
-    assert not any(word in text for word in ("/home/", "/root/", "/tmp/", "/Users/", "http://"))
-    assert {*notebook.metadata} == {"kernelspec", "language_info"}
-    assert notebook.metadata.kernelspec.name == "python3"
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_files_that_a_notebook_links_exist(name):
-    links = re.findall(r"\]\(([^)#]+)\)", "".join(cell.source for cell in read(name).cells))
+    links = re.findall(r"\]\(([^)#]+)\)", "".join(cell.source for cell in notebook.cells))
     assert links
     assert not [link for link in links if not (FOLDER / link).exists()]
 

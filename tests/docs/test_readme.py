@@ -24,9 +24,9 @@ import pytest
 import sgimd_torch
 from own import MODULE
 from sgimd_torch.__main__ import _call
-from sgimd_torch.catalogue import WORDS
-from sgimd_torch.runs.command_line import parse
-from sgimd_torch.runs.process import command
+from sgimd_torch.options.catalogue import WORDS
+from sgimd_torch.options.command_line import parse
+from sgimd_torch.runs.signals import command
 
 ROOT = Path(__file__).parents[2]
 ALONE = ("README.md", "CONTRIBUTING.md")  # each block by itself
@@ -100,10 +100,10 @@ class Block(NamedTuple):
 
 def blocks(page, *kinds):
     text = (ROOT / page).read_text(encoding="utf-8")
-    for found in re.finditer(r"^```(\w*) ?(.*)\n((?s:.*?))^```$", text, re.MULTILINE):
-        kind, name, body = found.groups()
+    for match in re.finditer(r"^```(\w*) ?(.*)\n((?s:.*?))^```$", text, re.MULTILINE):
+        kind, name, body = match.groups()
         if kind in kinds:
-            yield Block(page, text.count("\n", 0, found.start(3)) + 1, kind, name, body)
+            yield Block(page, text.count("\n", 0, match.start(3)) + 1, kind, name, body)
 
 
 @pytest.fixture
@@ -156,9 +156,9 @@ def test_commands_of_a_page_are_understood(page, folder):
         block.carry_out()
     for block in blocks(page, ""):
         for line in block.lines():
-            shown = re.search(r"(?:^|[\s/])sgimd ([a-z]+.*?)(?: \|\| .*)?$", line)
-            if shown:
-                line = re.sub(r"(--seeds \d+)-\d+", r"\1", re.sub(r"\$\{?\w+(:\?)?\}?", "1", shown[1]))
+            call = re.search(r"(?:^|[\s/])sgimd ([a-z]+.*?)(?: \|\| .*)?$", line)
+            if call:
+                line = re.sub(r"(--seeds \d+)-\d+", r"\1", re.sub(r"\$\{?\w+(:\?)?\}?", "1", call[1]))
                 name, *words = shlex.split(line, comments=True)
                 understand(name, words)
 

@@ -11,7 +11,6 @@ import sys
 import threading
 import zlib
 from functools import partial
-from html.parser import HTMLParser
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
@@ -43,71 +42,47 @@ def site(tmp_path_factory):
     out = tmp_path_factory.mktemp("documentation") / "site"
     build = "import sys, pathlib, make_site; sys.exit(make_site.build(pathlib.Path(sys.argv[1])))"
     command = [*without_network(), sys.executable, "-c", build, str(out)]
-    done = subprocess.run(
-        command, cwd=HERE, env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True
-    )
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(command, cwd=HERE, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     return out
 
 
-class Fetched(HTMLParser):
-    """What a browser would fetch to show a page."""
-
-    def __init__(self, text):
-        super().__init__()
-        self.addresses = []
-        self.feed(text)
-
-    def handle_starttag(self, name, attributes):
-        found = dict(attributes)
-        if name == "link" and found.get("rel") in ("canonical", "next", "prev"):
-            return
-        if name != "a":
-            self.addresses += [found[key] for key in ("src", "href", "data", "poster") if found.get(key)]
+# What a browser fetches to show a page: attributes of elements but links of texts, and of heads that name a page.
+FETCHED = re.compile(
+    r'<(?!a )(?![^>]* rel="?(?:canonical|next|prev)\b)[^>]* (?:src|href|data|poster)="?((?:https?:)?//[^" >]*)'
+)
 
 
 def test_no_page_asks_for_anything_from_outside(site):
     pages = list(site.rglob("*.html"))
     assert len(pages) > 50
-    for page in pages:
-        text = page.read_text(encoding="utf-8")
-        outside = [address for address in Fetched(text).addresses if re.match(r"(https?:)?//", address)]
-        assert not outside, page
+    outside = {page.name: FETCHED.findall(page.read_text(encoding="utf-8")) for page in pages}
+    assert not {page: addresses for page, addresses in outside.items() if addresses}
     for sheet in site.rglob("*.css"):
         assert not re.search(r"(url\(|@import)\s*[\"']?(https?:)?//", sheet.read_text(encoding="utf-8")), sheet
 
 
-def explained(site):
-    """Dotted names that have a place in the API pages: mkdocstrings lists them in a file for other projects."""
-    inventory = (site / "objects.inv").read_bytes()
-    lines = zlib.decompress(inventory.split(b"\n", 4)[4]).decode().splitlines()
-    return {line.split()[0] for line in lines}
+def public(module):
+    """Dotted names of a module and of everything public in it; of a module whose extra is missing, its name alone."""
+    yield module
+    with contextlib.suppress(ImportError):
+        for name, value in vars(importlib.import_module(module)).items():
+            if (inspect.isclass(value) or inspect.isfunction(value)) and value.__module__ == module and name[0] != "_":
+                yield f"{module}.{name}"
 
 
 def test_the_api_pages_have_every_module_and_everything_public_in_it(site):
-    found = explained(site)
-    missing = []
-    for path in (ROOT / "sgimd_torch").rglob("*.py"):
-        module = ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
-        missing += [module] if module not in found else []
-        with contextlib.suppress(ImportError):  # of an extra that is not installed
-            members = vars(importlib.import_module(module)).items()
-            missing += [
-                f"{module}.{name}"
-                for name, thing in members
-                if (inspect.isclass(thing) or inspect.isfunction(thing))
-                and thing.__module__ == module
-                and not name.startswith("_")
-                and f"{module}.{name}" not in found
-            ]
-    assert not missing
-
-
-def test_every_name_of_the_package_itself_is_explained(site):
-    found, front = explained(site), (site / "names.html").read_text(encoding="utf-8")
+    # mkdocstrings lists the names that have a place in a file for other projects.
+    inventory = zlib.decompress((site / "objects.inv").read_bytes().split(b"\n", 4)[4]).decode()
+    explained = {line.split()[0] for line in inventory.splitlines()}
+    paths = [path.relative_to(ROOT).with_suffix("") for path in (ROOT / "sgimd_torch").rglob("*.py")]
+    wanted = {name for path in paths for name in public(".".join(path.parts).removesuffix(".__init__"))}
+    assert not wanted - explained
+    front = (site / "names.html").read_text(encoding="utf-8")
     for name in set(sgimd_torch.__all__) - {"__version__"}:
         place = f"{getattr(sgimd_torch, name).__module__}.{name}"
-        assert place in found, place
+        assert place in explained, place
         assert f"#{place}" in front, place
 
 
@@ -124,7 +99,7 @@ def test_equations_are_mathml_without_a_command_that_was_not_understood(site):
     equations = re.findall(r"<math.*?</math>", page, re.DOTALL)
     assert len(equations) > 30
     assert "<mtext>(7)</mtext>" in page
-    assert not [each for each in equations if "\\" in each]
+    assert not [equation for equation in equations if "\\" in equation]
 
 
 @pytest.mark.parametrize("width", [1400, 390])
@@ -137,13 +112,13 @@ def test_pages_show_whole_without_a_network(site, width):
             tab.goto(f"file://{site / name}")
             tab.wait_for_load_state("networkidle")
             assert not [address for address in asked if not address.startswith(("file:", "data:", "blob:"))], name
-            assert tab.evaluate("[...document.images].filter(each => each.complete && !each.naturalWidth).length") == 0
+            broken = "[...document.images].filter(image => image.complete && !image.naturalWidth).length"
+            assert tab.evaluate(broken) == 0
             wider = tab.evaluate("document.documentElement.scrollWidth - window.innerWidth")
             assert wider <= 0, f"{name} is {wider} pixels wider than the window"
             if "method" in name:
-                sizes = tab.evaluate(
-                    "[...document.querySelectorAll('math')].map(e => e.getBoundingClientRect().height)"
-                )
+                heights = "math => math.getBoundingClientRect().height"
+                sizes = tab.evaluate(f"[...document.querySelectorAll('math')].map({heights})")
                 assert len(sizes) > 30
                 assert min(sizes) > 5
             tab.close()

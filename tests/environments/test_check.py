@@ -9,7 +9,7 @@ import sgimd_torch
 from sgimd_torch.__main__ import _call
 from sgimd_torch.environments.check import check_environment
 from sgimd_torch.environments.protocol import check_movement
-from sgimd_torch.runs.process import command
+from sgimd_torch.runs.signals import command
 from sgimd_torch.spaces import Box, stream
 
 

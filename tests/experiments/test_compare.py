@@ -12,12 +12,12 @@ from made_up import row
 from runs import ROOT, start
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.evaluation import Benchmark
+from sgimd_torch.options.command_line import parse
+from sgimd_torch.options.config import Config, words
 from sgimd_torch.record import RunError
-from sgimd_torch.runs.command_line import parse
-from sgimd_torch.runs.config import Config, words
 from sgimd_torch.runs.parallel import sweep
-from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import Run, read_run
+from sgimd_torch.runs.signals import command
 from table import CORNER, explored_rows, merge, read_table, result_rows, task_name, tiles_reached
 from variants import EXPERIMENTS, MADE, VARIANTS, make_subsets
 
@@ -28,7 +28,7 @@ sys.path.insert(0, "EXPERIMENTS")
 import variants
 from pathlib import Path
 from sgimd_torch.runs.parallel import sweep
-from sgimd_torch.runs.process import command
+from sgimd_torch.runs.signals import command
 tiny = dict(movements=40, evaluate_at=(20,), repeats=2, benchmark=Path(sys.argv.pop(1)))
 variants.EXPERIMENTS.clear()
 variants.EXPERIMENTS["paper"] = {"random": dict(algorithm="random", **tiny)}

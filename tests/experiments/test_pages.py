@@ -10,8 +10,8 @@ from claims import PAGES, README, TEMPLATES, filled, main
 from evidence import LAST, Evidence
 from made_up import write, write_rows
 from runs import ROOT
-from sgimd_torch.runs.command_line import parse
-from sgimd_torch.runs.process import command
+from sgimd_torch.options.command_line import parse
+from sgimd_torch.runs.signals import command
 from table import read_table
 from variants import VARIANTS
 

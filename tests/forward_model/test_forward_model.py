@@ -9,8 +9,8 @@ import torch
 from safetensors.torch import save_file
 
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.forward_model.diagnostics import coverage
 from sgimd_torch.forward_model.model import ForwardModel, load_forward_model
+from sgimd_torch.forward_model.shared import coverage
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import stream
 from worlds import NO_CONTEXT, remember

@@ -10,17 +10,17 @@ from runs import LIVE, RUN, content_of, end, start, stopped_at
 from sgimd_torch.board.legend import LEGEND
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import Benchmark, save_benchmark
-from sgimd_torch.forward_model.listener import ModelListener
 from sgimd_torch.forward_model.model import ForwardModel
+from sgimd_torch.forward_model.shared import ModelListener
 from sgimd_torch.memory import Memory
+from sgimd_torch.options.build import build
+from sgimd_torch.options.command_line import main
+from sgimd_torch.options.config import Config
 from sgimd_torch.record import Record, layout
-from sgimd_torch.runs.build import build
-from sgimd_torch.runs.command_line import main
-from sgimd_torch.runs.config import Config
 from sgimd_torch.runs.directory import FILE
-from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.run import Seconds
+from sgimd_torch.runs.signals import command
 from sgimd_torch.spaces import Episode, Move, stream
 
 MOVEMENTS = 170

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from experiments.progress_grid import ProgressGrid
-from sgimd_torch.catalogue import WORDS
 from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.goals.regions import absolute_progress, paired_progress
 from sgimd_torch.goals.uniform import UniformGoals
 from sgimd_torch.inverses.nearest import NearestNeighbour
+from sgimd_torch.options.catalogue import WORDS
 from sgimd_torch.spaces import Box, stream
 from worlds import NO_CONTEXT, part, problem, remember
 

@@ -40,7 +40,7 @@ def make():
     return Task(Arm(), lambda: Benchmark("Arm", np.array([[0.5, 0.5], [-0.3, 0.2]]), 0.1))
 """
 ODD = ["--environment", "odd:make", "--algorithm", "random", "--movements", "40", "--evaluate-at", "[]"]
-SWEEP = "import sys; from sgimd_torch.runs import process, sweep; sys.exit(process.command(sweep.main))"
+SWEEP = "import sys; from sgimd_torch.runs import signals, sweep; sys.exit(signals.command(sweep.main))"
 
 
 def odd_place(place):
@@ -54,7 +54,7 @@ def odd_place(place):
 def as_alone(place, out, seeds):
     """Whether the runs in ``out`` equal the undisturbed runs in ``alone``."""
     places = [f"random/seed-{seed:03d}" for seed in seeds]
-    return [content_of(out / each) for each in places] == [content_of(place / "alone" / each) for each in places]
+    return all(content_of(out / run) == content_of(place / "alone" / run) for run in places)
 
 
 def said_by(process, code):

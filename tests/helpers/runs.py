@@ -15,18 +15,18 @@ from sgimd_torch.runs.directory import FILE
 
 ROOT = Path(sgimd_torch.__file__).parents[1]
 MOVEMENTS = 90
-RUN = "import sys; from sgimd_torch.runs import command_line, process"
-LIVE = f"{RUN}; sys.exit(process.command(command_line.main, sys.argv[1:]))"
+RUN = "import sys; from sgimd_torch.options import command_line; from sgimd_torch.runs import signals"
+LIVE = f"{RUN}; sys.exit(signals.command(command_line.main, sys.argv[1:]))"
 # A run that stops its own process after {0} movements; every movement is written to the disk at once.
 STOPS = f"""
 import os, signal
 from sgimd_torch.runs import run
-run.COMMIT_EVERY, after = 0, run.Life._after
+run.COMMIT_EVERY, after = 0, run.RunLoop._after
 def stop(life, episode):
     after(life, episode)
     if life.movements == {{0}}:
         os.kill(os.getpid(), signal.SIGSTOP)
-run.Life._after = stop
+run.RunLoop._after = stop
 {LIVE}"""
 
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from sgimd_torch.algorithms.paper import imitation, observation, random_exploration, sagg_riac, sgim_d
-from sgimd_torch.catalogue import load_word
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
+from sgimd_torch.options.catalogue import load_word
 from sgimd_torch.parts import Inverse, Problem, Search
 from sgimd_torch.spaces import Array, Box, Demonstration, Estimate, stream
 
@@ -59,11 +59,11 @@ def problem(
         outcomes = outcomes or Box.cube(-1, 1, t)
         at_rest = outcomes.clip(np.zeros(outcomes.dim)) if rest is None else np.array(rest, dtype=float)
         environment = Boxes(contexts or Box.cube(0, 1, c), policies or Box.cube(0, 1, p), outcomes, at_rest, noise)
-    found = Problem(environment, seed, inverse=inverse)
+    made = Problem(environment, seed, inverse=inverse)
     if memory is not None:
-        found = found.over(memory)
-        found.inverse = inverse(found)
-    return found
+        made = made.over(memory)
+        made.inverse = inverse(made)
+    return made
 
 
 def last_posture(times: Array, trajectory: Array) -> Array:

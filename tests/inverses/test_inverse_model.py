@@ -6,10 +6,10 @@ from functools import partial
 import numpy as np
 import pytest
 
-from sgimd_torch.catalogue import WORDS
 from sgimd_torch.inverses.local import LocalInverse
 from sgimd_torch.inverses.locally_linear import LocallyLinear
 from sgimd_torch.inverses.nearest import NearestNeighbour
+from sgimd_torch.options.catalogue import WORDS
 from sgimd_torch.parts import Problem
 from sgimd_torch.spaces import Array, Box, stream
 from worlds import NO_CONTEXT, part, problem, remember

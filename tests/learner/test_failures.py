@@ -16,10 +16,10 @@ from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.protocol import Environment, SimulationError
 from sgimd_torch.evaluation import contexts_of_goals, evaluate
 from sgimd_torch.learner.events import Kind
+from sgimd_torch.options.command_line import main
 from sgimd_torch.record import Record
-from sgimd_torch.runs.command_line import main
-from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
+from sgimd_torch.runs.signals import command
 from sgimd_torch.session import NoOutcomeError, run
 from sgimd_torch.spaces import Array, Episode, Failure, stream
 from sgimd_torch.teachers import PeriodicTeacher

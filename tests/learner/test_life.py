@@ -12,16 +12,16 @@ from sgimd_torch.evaluation import evaluate
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner.events import Kind
 from sgimd_torch.memory import Memory
+from sgimd_torch.options.build import build
+from sgimd_torch.options.command_line import main
 from sgimd_torch.record import Record, ReplayError, RunError
-from sgimd_torch.record.lives import load_life, save_life
+from sgimd_torch.record.saving import load_life, save_life
 from sgimd_torch.rivals.alp_gmm import AlpGmm
 from sgimd_torch.rivals.cma_es import CmaEs
 from sgimd_torch.rivals.quality_diversity import cma_mae, cma_me, isoline, map_elites
-from sgimd_torch.runs.build import build
-from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.directory import FILE
-from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import config_of, read_run
+from sgimd_torch.runs.signals import command
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Demonstration, stream
 from sgimd_torch.teachers import PeriodicTeacher

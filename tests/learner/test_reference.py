@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sgimd_torch.runs.build import build
-from sgimd_torch.runs.config import Config
+from sgimd_torch.options.build import build
+from sgimd_torch.options.config import Config
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.runs.run import Life
+from sgimd_torch.runs.run import RunLoop
 
 KEPT = 60
 ARM = {"environment": "planar-arm-7"}
@@ -51,7 +51,7 @@ def lived(run, movements, out, *, until=None):
     config = config_of(run, movements, out)
     for last in [movements] if until is None else [until, movements]:
         parts = build(config)
-        with Life(parts, resume=last != until and until is not None) as life:
+        with RunLoop(parts, resume=last != until and until is not None) as life:
             for episode in life.episodes():
                 if episode.index + 1 == last:
                     break

@@ -1,4 +1,5 @@
-"""Versions: scripts/setup installs exactly the pinned packages, and the lowest allowed versions work, too."""
+"""Versions: scripts/setup installs exactly the pinned packages, the lowest allowed versions work, too, and the workflow
+runs the checks of scripts/test on all supported systems and Pythons."""
 
 import importlib.metadata
 import os
@@ -9,6 +10,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+import yaml
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
@@ -20,23 +22,28 @@ PINNED = dict(
 )
 
 
-def required(*names):
+NAME = PROJECT["project"]["name"]
+WORKFLOW = yaml.safe_load((ROOT / ".github/workflows/tests.yml").read_text(encoding="utf-8"))
+BUILD = [Requirement(text) for text in PROJECT["build-system"]["requires"]]
+
+
+def required(*extras):
     """Requirements of the project with some of its extras; an extra that contains other extras is resolved."""
-    lists = [PROJECT["project"]["dependencies"], *(EXTRAS[name] for name in names)]
-    requirements = [Requirement(text) for each in lists for text in each]
-    again = {extra for each in requirements if each.name == PROJECT["project"]["name"] for extra in each.extras}
-    if again - {*names}:
-        return required(*{*names, *again})
-    return [each for each in requirements if each.name != PROJECT["project"]["name"]]
+    lists = [PROJECT["project"]["dependencies"], *(EXTRAS[extra] for extra in extras)]
+    requirements = [Requirement(text) for texts in lists for text in texts]
+    contained = {extra for requirement in requirements if requirement.name == NAME for extra in requirement.extras}
+    if contained - {*extras}:
+        return required(*{*extras, *contained})
+    return [requirement for requirement in requirements if requirement.name != NAME]
 
 
 def closure(requirements):
     """Names of all packages that these requirements install on this system, directly or indirectly."""
-    wanted = [(each, extra) for each in requirements for extra in (each.extras or {""}) | {""}]
+    wanted = [(requirement, extra) for requirement in requirements for extra in requirement.extras | {""}]
     done = set()
     while wanted:
-        each, extra = wanted.pop()
-        name = canonicalize_name(each.name)
+        requirement, extra = wanted.pop()
+        name = canonicalize_name(requirement.name)
         if (name, extra) in done:
             continue
         done.add((name, extra))
@@ -48,9 +55,7 @@ def closure(requirements):
 
 
 def test_everything_that_setup_installs_is_pinned_and_nothing_else():
-    build = [Requirement(text) for text in PROJECT["build-system"]["requires"]]
-    names = closure([*required("all", "dev"), *build])
-    assert names == {canonicalize_name(name) for name in PINNED}
+    assert closure([*required("all", "dev"), *BUILD]) == {canonicalize_name(name) for name in PINNED}
 
 
 def test_what_is_installed_has_the_pinned_versions():
@@ -59,8 +64,8 @@ def test_what_is_installed_has_the_pinned_versions():
 
 
 def test_every_requirement_says_its_lowest_version():
-    for each in [*required("all", "dev"), *(Requirement(text) for text in PROJECT["build-system"]["requires"])]:
-        assert len([part for part in each.specifier if part.operator == ">="]) == 1, each
+    for requirement in [*required("all", "dev"), *BUILD]:
+        assert [part.operator for part in requirement.specifier].count(">=") == 1, requirement
 
 
 ABSENT = """import importlib.abc, sys
@@ -100,8 +105,8 @@ def lowest(requirement):
 @pytest.mark.slow
 def test_the_lowest_versions_allowed_install_together_and_pass(tmp_path):
     # About 3 GB to download, as the lowest torch comes with its libraries for GPUs. Linters are not tested.
-    wanted = [*required("all", "dev"), *(Requirement(text) for text in PROJECT["build-system"]["requires"])]
-    pins = [lowest(each) for each in wanted if each.name not in ("mypy", "ruff", "pytest-xdist")]
+    wanted = [*required("all", "dev"), *BUILD]
+    pins = [lowest(requirement) for requirement in wanted if requirement.name not in ("mypy", "ruff", "pytest-xdist")]
     python = str(tmp_path / "venv/bin/python")
     subprocess.run([sys.executable, "-m", "venv", str(tmp_path / "venv")], check=True)
     install = [python, "-m", "pip", "install", "-q", "--disable-pip-version-check", "--no-cache-dir", *pins]
@@ -121,3 +126,22 @@ SMOKE = (
     *("environments", "goals", "inverses", "rivals", "forward_model", "board", "figures"),
     *("runs/test_run.py", "views/test_film.py"),
 )
+
+
+def test_the_workflow_runs_the_checks_that_one_runs_by_hand_and_builds_a_release():
+    (step,) = [step for step in WORKFLOW["jobs"]["test"]["steps"] if step.get("run") == "scripts/test"]
+    assert step["env"] == {"PYTHON": "python"}  # the Python that the workflow has set up
+    matrix = WORKFLOW["jobs"]["test"]["strategy"]["matrix"]
+    assert matrix["python"] == ["3.11", "3.12", "3.13"]
+    assert {*matrix["system"], *(entry["system"] for entry in matrix["include"])} == {"ubuntu-latest", "macos-latest"}
+    commands = [step["run"] for step in WORKFLOW["jobs"]["package"]["steps"] if "run" in step]
+    assert commands[1:] == ["python -m build", "python -m twine check --strict dist/*"]
+
+
+def test_the_workflow_may_read_only_and_its_actions_have_a_version():
+    assert WORKFLOW["permissions"] == {"contents": "read"}
+    for job in WORKFLOW["jobs"].values():
+        assert "permissions" not in job
+        actions = [step["uses"] for step in job["steps"] if "uses" in step]
+        assert actions
+        assert all(name.rpartition("@v")[2].isdecimal() for name in actions)

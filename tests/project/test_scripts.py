@@ -14,6 +14,7 @@ import check_physics
 import make_benchmark
 import make_demonstrations
 import make_teachers
+import mutants
 from sgimd_torch.algorithms.paper import random_exploration, sagg_riac, sgim_d
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.environments.fishing_rod import FishingRod
@@ -47,6 +48,7 @@ def go(script, options):
         (make_teachers, "--seed -1"),
         (make_teachers, "--out nowhere"),
         (make_teachers, "--runs 1 --processes 1 --movements 5 --n 6"),  # too few movements
+        (mutants, "nowhere"),
         (check_physics, "--movements 0"),
         (bench, "--rounds 0"),
         (bench, "--movements 0"),
@@ -56,7 +58,7 @@ def go(script, options):
 )
 def test_what_makes_no_sense_is_refused_and_nothing_is_written(tmp_path, monkeypatch, capsys, script, options):
     monkeypatch.chdir(tmp_path)
-    out = {bench: "", check_physics: "", make_teachers: "--out . "}.get(script, "--out out.npz ")
+    out = {bench: "", check_physics: "", mutants: "", make_teachers: "--out . "}.get(script, "--out out.npz ")
     with pytest.raises(SystemExit) as end:
         go(script, out + options)
     assert end.value.code == 2
@@ -67,19 +69,18 @@ def test_what_makes_no_sense_is_refused_and_nothing_is_written(tmp_path, monkeyp
 def lived(algorithm, seed, movements):
     """The memory of a learner after its movements, without a run on disk."""
     rod, teacher = FishingRod(threads=1), PeriodicTeacher(load_demonstrations(), stream(seed, "teacher"))
-    learner = {
-        "random": lambda: random_exploration(rod, seed),
-        "sagg-riac": lambda: sagg_riac(rod, seed),
-        "sgim-d": lambda: sgim_d(rod, seed, correspondence=rod.primitive.correspondence),
-    }[algorithm]()
-    for _ in run(learner, rod, seed, movements=movements, teacher=teacher if algorithm == "sgim-d" else None):
+    taught = {"correspondence": rod.primitive.correspondence} if algorithm is sgim_d else {}
+    learner = algorithm(rod, seed, **taught)
+    for _ in run(learner, rod, seed, movements=movements, teacher=teacher if taught else None):
         pass
     return learner.memory
 
 
 def test_the_benchmark_is_a_goal_in_each_tile_that_the_three_learners_reached(tmp_path):
     go(make_benchmark, f"--out {tmp_path}/b.npz --runs 1 --movements 40 --seed 2007 --tiles 20")
-    outcomes = np.concatenate([lived(name, 2007, 40).outcomes for name in ("random", "sagg-riac", "sgim-d")])
+    outcomes = np.concatenate(
+        [lived(algorithm, 2007, 40).outcomes for algorithm in (random_exploration, sagg_riac, sgim_d)]
+    )
     box = Box.cube(-1, 1, 2)
 
     def goals(side):
@@ -95,8 +96,9 @@ def test_the_benchmark_is_a_goal_in_each_tile_that_the_three_learners_reached(tm
 @pytest.fixture(scope="module")
 def pool():
     """The exemplars with outcomes in T of two SAGG-RIAC learners after 30 movements each."""
-    memories = [lived("sagg-riac", seed, 30) for seed in (4000, 4001)]
-    thetas, outcomes = (np.concatenate([getattr(each, name) for each in memories]) for name in ("thetas", "outcomes"))
+    memories = [lived(sagg_riac, seed, 30) for seed in (4000, 4001)]
+    thetas = np.concatenate([memory.thetas for memory in memories])
+    outcomes = np.concatenate([memory.outcomes for memory in memories])
     inside = FishingRod().outcomes.contains(outcomes)
     return thetas[inside], outcomes[inside]
 
@@ -111,10 +113,10 @@ def teachers(tmp_path_factory):
 
 
 def rows_of(demonstrations, thetas):
-    """Rows of ``thetas`` that the recordings show, found by the correspondence of the learner."""
+    """Rows of ``thetas`` that the recordings show, by the correspondence of the learner."""
     primitive = FishingRod().primitive
-    found = np.stack([primitive.correspondence(shown.times, shown.trajectory) for shown in demonstrations])
-    distances = np.abs(found[:, None] - thetas).max(axis=2)
+    translated = np.stack([primitive.correspondence(lesson.times, lesson.trajectory) for lesson in demonstrations])
+    distances = np.abs(translated[:, None] - thetas).max(axis=2)
     assert (distances.min(axis=1) < 1e-6).all()
     return distances.argmin(axis=1)
 
@@ -123,7 +125,7 @@ def test_the_naive_demonstrator_shows_what_it_remembers(pool, teachers):
     thetas, outcomes = pool
     rows = rows_of(teachers[1], thetas)
     assert len(set(rows)) == 5
-    np.testing.assert_array_equal([shown.outcome for shown in teachers[1]], outcomes[rows])
+    np.testing.assert_array_equal([lesson.outcome for lesson in teachers[1]], outcomes[rows])
 
 
 def test_the_careful_demonstrator_shows_one_movement_of_a_tile(pool, teachers):
@@ -151,12 +153,6 @@ def test_executed_again_without_noise_movements_land_where_they_did(pool):
     assert np.ptp(make_teachers.execute_again(FishingRod(), pool[0][:2], stream(0, "test")), axis=0).min() > 0
 
 
-def test_a_pool_on_too_few_tiles_is_refused(pool):
-    thetas, outcomes = pool
-    with pytest.raises(ValueError, match="only 1 tiles have a movement to show, too few for --n 3"):
-        make_teachers.careful(FishingRod(), thetas[[0, 0, 0]], outcomes[[0, 0, 0]], 3, stream(0, "test"))
-
-
 INTERPRETER = """#!/usr/bin/env bash
 # A fake Python: its venv is one file, and its pip takes 0.3 s and notes its arguments.
 case "$1 $2" in
@@ -181,60 +177,53 @@ def setup(tmp_path):
     def start(*wishes, wanted=0, **environment):
         environment = {**os.environ, "PYTHON": str(python), "NOTES": str(notes), **environment}
         command = [str(root / "scripts/setup")]
-        started = [subprocess.Popen([*command, *wish.split()], env=environment) for wish in wishes]
-        assert [each.wait() for each in started] == [wanted] * len(wishes)
+        processes = [subprocess.Popen([*command, *wish.split()], env=environment) for wish in wishes]
+        assert [process.wait() for process in processes] == [wanted] * len(wishes)
         return notes.read_text().split()
 
     start.stamp = root / ".venv/setup-stamp"
     return start
 
 
+DEMO, ALL = ".[plot,report]", ".[all,dev]"  # what setup gives to pip
+
+
 def test_setup_installs_what_is_missing_and_everything_serves_the_demo(setup):
-    assert setup("demo") == ["venv", ".[plot,report]"]
-    assert setup("demo") == ["venv", ".[plot,report]"]
-    assert setup("") == ["venv", ".[plot,report]", ".[all,dev]"]
-    assert setup("demo") == setup("") == ["venv", ".[plot,report]", ".[all,dev]"]
+    assert setup("demo") == setup("demo") == ["venv", DEMO]
+    assert setup("") == setup("demo") == setup("") == ["venv", DEMO, ALL]
+    (setup.stamp.parents[1] / "constraints.txt").write_text("numpy==2.0\n")  # another list of requirements
+    assert setup("") == ["venv", DEMO, ALL, ALL]
 
 
-def test_of_several_setups_at_once_one_installs(setup):
-    assert setup("demo", "demo", "demo") == ["venv", ".[plot,report]"]
+def test_of_several_setups_at_once_one_installs_and_another_word_is_refused(setup):
+    assert setup("demo", "demo", "demo") == ["venv", DEMO]
+    assert setup("demos", wanted=2) == ["venv", DEMO]
 
 
 def test_an_installation_cut_short_starts_afresh_and_one_that_failed_goes_on(setup):
-    assert setup("demo", wanted=3, PIP_FAILS="3") == ["venv", ".[plot,report]"]
-    assert setup("demo") == ["venv", ".[plot,report]", ".[plot,report]"]
+    assert setup("demo", wanted=3, PIP_FAILS="3") == ["venv", DEMO]
+    assert setup("demo") == ["venv", DEMO, DEMO]
     setup.stamp.write_text(setup.stamp.read_text().splitlines()[0] + "\ninstalling\n")
-    assert setup("demo")[3:] == ["venv", ".[plot,report]"]
-
-
-def test_a_changed_list_of_requirements_is_installed(setup):
-    setup("")
-    (setup.stamp.parents[1] / "constraints.txt").write_text("numpy==2.0\n")
-    assert setup("") == ["venv", ".[all,dev]", ".[all,dev]"]
-
-
-def test_setup_refuses_another_word(setup):
-    assert setup("demos", wanted=2) == []
+    assert setup("demo")[3:] == ["venv", DEMO]
 
 
 @pytest.mark.slow
 def test_the_bench_compares_two_commits_side_by_side(capsys, monkeypatch):
     measurements, movements = bench.PARTS["learning"]
-    monkeypatch.setitem(bench.PARTS, "learning", (measurements[1:2], movements))  # one learner is enough here
+    monkeypatch.setitem(bench.PARTS, "learning", (measurements[1:2], movements))  # one learner is enough
     assert go(bench, "--only learning run --rounds 1 --movements 20 --against HEAD") == 0
     head, *lines = capsys.readouterr().out.splitlines()
     assert head.split() == ["here", "there", "here/there"]
     assert len(lines) == 4 * 3 + 1 + 3
     for line in lines:
-        here, there, ratio = map(float, line.split()[-3:])
-        assert here > 0
-        assert ratio == pytest.approx(here / there, rel=0.01)
+        ours, theirs, ratio = map(float, line.split()[-3:])
+        assert ours > 0
+        assert ratio == pytest.approx(ours / theirs, rel=0.01)
 
 
 def test_smaller_time_steps_of_the_rod_land_nearer_to_the_smallest(capsys):
     assert go(check_physics, "--time-steps --movements 10") == 0
-    rows = [[float(cell) for cell in line.split()] for line in capsys.readouterr().out.splitlines()[1:]]
-    found = np.array(rows)
-    assert found[:, 0].tolist() == [10, 5, 2, 1]
-    assert (found[:-1, [1, 4]] > 1.5 * found[1:, [1, 4]]).all()  # the medians
-    assert found[0, 1] < 0.037  # the noise
+    table = np.array([[float(cell) for cell in line.split()] for line in capsys.readouterr().out.splitlines()[1:]])
+    assert table[:, 0].tolist() == [10, 5, 2, 1]
+    assert (table[:-1, [1, 4]] > 1.5 * table[1:, [1, 4]]).all()  # the medians
+    assert table[0, 1] < 0.037  # the noise

@@ -14,11 +14,11 @@ import sgimd_torch
 
 PACKAGE = "sgimd_torch"
 ROWS = [  # a room imports only from rows above its own
-    {"spaces", "files", "catalogue"},
+    {"spaces", "files", "options"},
     {"memory", "environments"},
     {"parts", "demonstrations"},
-    {"competence", "teachers", "evaluation", "goals", "explore", "figures"},
-    {"inverses", "searches", "board"},
+    {"competence", "teachers", "evaluation", "goals", "searches", "figures"},
+    {"inverses", "board"},
     {"strategies"},
     {"learner"},
     {"changes"},
@@ -29,6 +29,7 @@ ROWS = [  # a room imports only from rows above its own
     {"__main__"},
 ]
 ROW = {room: row for row, rooms in enumerate(ROWS) for room in rooms}
+UPSTAIRS = dict.fromkeys(("options/build", "options/command_line"), "runs")  # files of another room than their folder
 LIBRARIES = {  # rooms or single files that may import a library, by library
     "numpy": ROW.keys(),
     "scipy": ROW.keys() - {"spaces"},
@@ -51,11 +52,12 @@ LIBRARIES = {  # rooms or single files that may import a library, by library
     "PIL": {"views/film"},
     "imageio_ffmpeg": {"views/film"},
     "viser": {"teach"},
+    "mink": {"teach"},
     "trimesh": {"teach"},
     "websockets": {"teach"},
     "jinja2": {"views/report"},
-    "docstring_parser": {"catalogue/options"},
-    "tqdm": {"runs/process", "views"},
+    "docstring_parser": {"options/signature"},
+    "tqdm": {"runs/signals", "views"},
     "threadpoolctl": {"inverses/gaussian_process"},
     "cma": {"rivals"},
     "sklearn": {"rivals"},
@@ -66,7 +68,7 @@ LIBRARIES = {  # rooms or single files that may import a library, by library
 WORLDS = {"environments"}
 PROTOCOL = "environments.protocol"  # the part of ``environments`` that other rooms may import
 LEARNING = {
-    *{"parts", "memory", "competence", "goals", "explore", "inverses", "searches", "strategies", "learner", "teachers"},
+    *{"parts", "memory", "competence", "goals", "searches", "inverses", "strategies", "learner", "teachers"},
     *{"asking", "changes", "rivals", "forward_model"},
 }
 FREE = {"runs", "views", "teach", "__init__"}  # rooms that combine learning and environments
@@ -82,16 +84,21 @@ def imports(source: str):
             yield from (f"{home}.{alias.name}" for alias in node.names)
 
 
+def room_of(place: str) -> str:
+    """Room of a file, such as "goals" of "goals/regions"."""
+    return UPSTAIRS.get(place, place.partition("/")[0])
+
+
 def breach(place: str, name: str) -> str | None:
     """Message if a file at ``place``, such as "goals/regions", may not import a dotted name; None if it may."""
-    room, (top, *rest) = place.partition("/")[0], name.split(".")
+    room, (top, *rest) = room_of(place), name.split(".")
     if top != PACKAGE:
         allowed = LIBRARIES.get(top, ())
-        here = any(place == each or place.startswith(f"{each}/") for each in allowed)
+        may = any(place == owner or place.startswith(f"{owner}/") for owner in allowed)
         return (
-            None if here or top in sys.stdlib_module_names else f"{place} imports {name}, allowed in {sorted(allowed)}"
+            None if may or top in sys.stdlib_module_names else f"{place} imports {name}, allowed in {sorted(allowed)}"
         )
-    target = rest[0] if rest and rest[0] in ROW else "__init__"
+    target = room_of("/".join(rest[:2])) if rest and rest[0] in ROW else "__init__"
     if target == "__init__":
         return None if rest[:1] == ["__version__"] or not rest else f"{place} imports {name} from the package"
     if target != room and ROW[target] >= ROW[room]:
@@ -106,15 +113,15 @@ def breach(place: str, name: str) -> str | None:
 
 
 def breaches(package: Path) -> list[str]:
-    found = []
+    messages = []
     for path in sorted(package.rglob("*.py")):
         place = path.relative_to(package).with_suffix("").as_posix()
-        room = place.partition("/")[0]
+        room = room_of(place)
         if room not in ROW and place != "__init__":
-            found.append(f"{place} has no row yet: give it one in {Path(__file__).name}")
+            messages.append(f"{place} has no row yet: give it one in {Path(__file__).name}")
             continue
-        found += filter(None, (breach(place, name) for name in imports(path.read_text(encoding="utf-8"))))
-    return found
+        messages += filter(None, (breach(place, name) for name in imports(path.read_text(encoding="utf-8"))))
+    return messages
 
 
 def arrows(package: Path) -> dict[str, set[str]]:
@@ -124,15 +131,15 @@ def arrows(package: Path) -> dict[str, set[str]]:
         for path in package.rglob("*.py")
     }
     names = {name.removesuffix(".__init__"): name for name in files}
-    found = {}
+    graph = {}
     for name, path in files.items():
         wanted = set()
         for dotted in imports(path.read_text(encoding="utf-8")):
             while dotted and dotted not in names:
                 dotted = dotted.rpartition(".")[0]
             wanted |= {names[dotted]} if dotted else set()
-        found[name] = wanted - {name, f"{PACKAGE}.__init__"}
-    return found
+        graph[name] = wanted - {name, f"{PACKAGE}.__init__"}
+    return graph
 
 
 def circle(graph: dict[str, set[str]]) -> list[str]:
@@ -145,8 +152,8 @@ def circle(graph: dict[str, set[str]]) -> list[str]:
         if name in done:
             return []
         path.append(name)
-        for each in sorted(graph[name]):
-            if loop := visit(each):
+        for imported in sorted(graph[name]):
+            if loop := visit(imported):
                 return loop
         path.pop()
         done.add(name)
@@ -228,18 +235,8 @@ def loaded_by(program: str) -> set[str]:
 
 
 HEAVY = {
-    "numba",
-    "torch",
-    "lightning",
-    "pytorch_lightning",
-    "matplotlib",
-    "tensorboardX",
-    "sklearn",
-    "cma",
-    "ribs",
-    "jinja2",
-    "gymnasium",
-    "viser",
+    *{"numba", "torch", "lightning", "pytorch_lightning", "matplotlib", "tensorboardX", "sklearn", "cma", "ribs"},
+    *{"jinja2", "gymnasium", "viser"},
 }
 
 

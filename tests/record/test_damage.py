@@ -8,11 +8,11 @@ import pytest
 from records import fill, read
 from runs import MOVEMENTS, content_of, edit
 from sgimd_torch.evaluation import Benchmark, save_benchmark
+from sgimd_torch.options.command_line import main
 from sgimd_torch.record import Record, RunError, layout
-from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.directory import FILE
-from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
+from sgimd_torch.runs.signals import command
 from sgimd_torch.spaces import stream
 
 ONE, OTHER = "SELECT * FROM {table} WHERE rowid = {first}", "SELECT * FROM other.{table}"

@@ -13,15 +13,15 @@ import pytest
 
 from runs import content_of
 from sgimd_torch.algorithms import families
-from sgimd_torch.catalogue import WORDS, about, load_word, place_of
 from sgimd_torch.figures.names import colour, label
-from sgimd_torch.runs import command_line
-from sgimd_torch.runs.build import build
-from sgimd_torch.runs.command_line import main, parse
-from sgimd_torch.runs.config import Config, words
-from sgimd_torch.runs.help import overview
-from sgimd_torch.runs.process import command
+from sgimd_torch.options import command_line
+from sgimd_torch.options.build import build
+from sgimd_torch.options.catalogue import WORDS, about, load_word, place_of
+from sgimd_torch.options.command_line import main, parse
+from sgimd_torch.options.config import Config, words
+from sgimd_torch.options.help import overview
 from sgimd_torch.runs.read import read_run
+from sgimd_torch.runs.signals import command
 from sgimd_torch.runs.tasks import MOST_GOALS, goals_all_over
 from sgimd_torch.session import run
 

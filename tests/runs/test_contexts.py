@@ -6,11 +6,11 @@ import pytest
 from runs import content_of
 from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.evaluation import contexts_of_goals
-from sgimd_torch.runs.build import task_of
-from sgimd_torch.runs.command_line import main
-from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.process import command
+from sgimd_torch.options.build import task_of
+from sgimd_torch.options.command_line import main
+from sgimd_torch.options.config import Config
 from sgimd_torch.runs.read import read_run
+from sgimd_torch.runs.signals import command
 from sgimd_torch.runs.tasks.taught import demonstrations_of
 
 

@@ -8,12 +8,12 @@ import pytest
 from runs import content_of, edit, settle
 from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.record.lives import save_life
-from sgimd_torch.runs.command_line import main
+from sgimd_torch.options.command_line import main
+from sgimd_torch.record.saving import save_life
 from sgimd_torch.runs.directory import FILE
 from sgimd_torch.runs.load import load_learner
-from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import read_run
+from sgimd_torch.runs.signals import command
 from sgimd_torch.views.report.command import main as report
 
 SHORT = ["--environment", "planar-arm-7", "--repeats", "0", "--evaluate-at", "[]"]

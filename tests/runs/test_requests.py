@@ -9,12 +9,12 @@ from runs import content_of
 from sgimd_torch.asking.teachers import AnsweringTeacher
 from sgimd_torch.demonstrations import SHIPPED, load_demonstrations
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.runs.build import build, task_of
-from sgimd_torch.runs.command_line import main, parse
-from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.process import Stopping, command
+from sgimd_torch.options.build import build, task_of
+from sgimd_torch.options.command_line import main, parse
+from sgimd_torch.options.config import Config
 from sgimd_torch.runs.read import movements_on_disk, read_run
-from sgimd_torch.runs.run import Life
+from sgimd_torch.runs.run import RunLoop
+from sgimd_torch.runs.signals import Stopping, command
 from sgimd_torch.runs.tasks.taught import demonstrations_of
 from sgimd_torch.spaces import stream
 
@@ -73,7 +73,7 @@ def test_a_run_that_lost_its_robot_just_after_it_was_shown_something_has_that_an
     with monkeypatch.context() as patched:
         parts = build(parse([*ACTS, *SHORT, f"--out={tmp_path}", "--name=run"])[0])
         patched.setattr(PlanarArm, "execute", execute)
-        with Stopping() as stopping, pytest.raises(KeyboardInterrupt), Life(parts, resume=False) as life:
+        with Stopping() as stopping, pytest.raises(KeyboardInterrupt), RunLoop(parts, resume=False) as life:
             life.go_on(stopping)
     cut = content_of(tmp_path / "run" / "seed-003")["events"]
     assert [row[1] for row in cut[-2:]] == ["asked", "shown"]

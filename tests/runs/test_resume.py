@@ -23,13 +23,13 @@ from runs import (
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.inverses.locally_linear import LocallyLinear
 from sgimd_torch.learner.events import Kind
+from sgimd_torch.options.command_line import main
 from sgimd_torch.record import Record
 from sgimd_torch.runs import evaluations
 from sgimd_torch.runs import run as run_module
-from sgimd_torch.runs.command_line import main
 from sgimd_torch.runs.directory import FILE
-from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import movements_on_disk, read_run
+from sgimd_torch.runs.signals import command
 from sgimd_torch.spaces import stream
 
 LASTING = ("events", "demonstrations")
@@ -301,7 +301,7 @@ def test_a_full_disk_is_reported_and_the_run_can_go_on(tmp_path, go, benchmark, 
 def test_a_program_that_reads_the_record_all_the_time_stops_no_run(tmp_path, go, reference, monkeypatch, capsys):
     monkeypatch.setattr(run_module, "COMMIT_EVERY", 0.0)
     monkeypatch.setattr("sgimd_torch.record._IMPATIENCE", 0.0)
-    path, after, commit = tmp_path / "sgim-d" / "seed-003" / FILE, run_module.Life._after, run_module.Life._settle
+    path, after, commit = tmp_path / "sgim-d" / "seed-003" / FILE, run_module.RunLoop._after, run_module.RunLoop._settle
     viewers, last = [], []
 
     def look(life, episode):
@@ -318,8 +318,8 @@ def test_a_program_that_reads_the_record_all_the_time_stops_no_run(tmp_path, go,
             viewers[0].close()
         return done
 
-    monkeypatch.setattr(run_module.Life, "_after", look)
-    monkeypatch.setattr(run_module.Life, "_settle", settle)
+    monkeypatch.setattr(run_module.RunLoop, "_after", look)
+    monkeypatch.setattr(run_module.RunLoop, "_settle", settle)
     assert go(tmp_path) == 0
     assert "waiting until no other program reads" in capsys.readouterr().err
     assert content_of(path.parent) == reference

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 from runs import ROOT, arguments, content_of
-from sgimd_torch.catalogue import WORDS
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
+from sgimd_torch.options.build import build
+from sgimd_torch.options.catalogue import WORDS
+from sgimd_torch.options.config import Config
 from sgimd_torch.runs import evaluations
-from sgimd_torch.runs.build import build
-from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.process import Progress, Stopped, Stopping
 from sgimd_torch.runs.read import config_of, read_run
-from sgimd_torch.runs.run import Life
+from sgimd_torch.runs.run import RunLoop
+from sgimd_torch.runs.signals import Progress, Stopped, Stopping
 from sgimd_torch.spaces import Demonstration
 
 
@@ -43,8 +43,8 @@ def test_what_a_run_learns_with_answers_once_for_both_of_its_names(tmp_path, go)
     assert np.isfinite(found["own"]["noise_floor"]).tolist() == [False, False, True]  # only the last one measures it
     assert np.isnan(found["linear"]["noise_floor"]).all()
     parts = build(config_of(read_run(next(tmp_path.glob("*/seed-003")))))
-    assert parts.answers["linear"] is parts.answers["own"] is parts.learner.inverse
-    assert parts.answers["nearest"] is not parts.answers["own"]
+    assert parts.inverses["linear"] is parts.inverses["own"] is parts.learner.inverse
+    assert parts.inverses["nearest"] is not parts.inverses["own"]
 
 
 def test_a_run_has_the_answers_that_were_asked_for_and_its_movements_do_not_depend_on_them(tmp_path, go, reference):
@@ -138,7 +138,7 @@ def test_a_signal_is_heard_and_a_second_one_stops_at_once(capfd):
 
 POOL = """
 import multiprocessing, os, signal, time
-from sgimd_torch.runs.process import Stopping
+from sgimd_torch.runs.signals import Stopping
 with Stopping():
     pool = multiprocessing.get_context("fork").Pool(2)
     pool.map(abs, range(4))
@@ -213,7 +213,7 @@ def test_the_time_of_evaluations_to_come_counts_their_movements(tmp_path):
         Config.from_settings({"algorithm": "random", "environment": "planar-arm-7", "out": tmp_path} | evaluated)
     )
     n = len(parts.benchmark.goals)
-    with Life(parts, resume=False) as life:
+    with RunLoop(parts, resume=False) as life:
         episodes = life.episodes()
         for movements, spent, later in (
             (9, {"physics": 18.0}, 2.0 * 6 * n),
@@ -227,7 +227,7 @@ def test_the_time_of_evaluations_to_come_counts_their_movements(tmp_path):
 
 def test_the_time_that_is_left_counts_evaluations(monkeypatch, capsys):
     clock = [0.0]
-    monkeypatch.setattr("sgimd_torch.runs.process.time.monotonic", lambda: clock[0])
+    monkeypatch.setattr("sgimd_torch.runs.signals.time.monotonic", lambda: clock[0])
     with Progress("run", 100) as progress:
         clock[0] = 60.0  # 50 movements in 50 s, and an evaluation of 10 s; two more are to come
         progress.show(50, spent=10.0, later=20.0)

@@ -13,11 +13,11 @@ import pytest
 
 from odd import ODD, SWEEP, as_alone, odd_place, said_by
 from runs import content_of, start
+from sgimd_torch.options.command_line import main as run
+from sgimd_torch.options.config import Config
 from sgimd_torch.runs import parallel
-from sgimd_torch.runs.command_line import main as run
-from sgimd_torch.runs.config import Config
-from sgimd_torch.runs.process import Failed, command
 from sgimd_torch.runs.read import finished, movements_on_disk
+from sgimd_torch.runs.signals import Failed, command
 from sgimd_torch.runs.sweep import main, variants_of
 
 # An arm without physics; 40 movements and one evaluation take a moment.

@@ -5,12 +5,12 @@ import pytest
 
 from runs import about_of, content_of, end, settle, stopped_at
 from sgimd_torch.evaluation import evaluate
-from sgimd_torch.runs.build import build
-from sgimd_torch.runs.command_line import main
-from sgimd_torch.runs.config import Config
+from sgimd_torch.options.build import build
+from sgimd_torch.options.command_line import main
+from sgimd_torch.options.config import Config
 from sgimd_torch.runs.load import load_learner
-from sgimd_torch.runs.process import command
 from sgimd_torch.runs.read import finished, read_run
+from sgimd_torch.runs.signals import command
 
 ARM = "--environment planar-arm-7 --seed 3 --movements 260 --evaluate-at 120"
 
@@ -114,6 +114,23 @@ def test_a_limit_that_is_no_error_is_refused_in_a_line(tmp_path, capsys, until):
     assert said[0].startswith(("error: until must be an error above 0", "error: --until must be a number"))
     assert len(said) == 2
     assert not list(tmp_path.iterdir())
+
+
+SURE = """
+from sgimd_torch.inverses.nearest import NearestNeighbour
+from sgimd_torch.parts import Inverse
+
+class Sure(Inverse):
+    def __call__(self, context, goal):
+        estimate = NearestNeighbour(self.problem)(context, goal)
+        return estimate._replace(expected=goal, sd=0.01)
+"""
+
+
+def test_an_inverse_model_of_a_users_own_that_says_how_sure_it_is_ends_the_run(tmp_path, module):
+    module("confident", SURE)
+    assert go(tmp_path, "--until=0.02", "--inverse=confident:Sure") == 0
+    assert read_run(path_of(tmp_path)).summary["movements"] == 50
 
 
 def test_a_learner_that_does_not_know_how_sure_it_is_cannot_end_early(tmp_path, capsys):

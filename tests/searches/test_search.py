@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize, rosen
 
-from sgimd_torch.catalogue import WORDS
-from sgimd_torch.catalogue.options import options_of
+from sgimd_torch.options.catalogue import WORDS
+from sgimd_torch.options.signature import options_of
 from sgimd_torch.searches.perturb import Perturb, Vary
 from sgimd_torch.searches.simplex import NelderMead, simplex_descent
 from sgimd_torch.spaces import Array, Box, Estimate, stream

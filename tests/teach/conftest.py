@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from browser import chromium
-from sgimd_torch.runs.config import Config
+from sgimd_torch.options.config import Config
 from sgimd_torch.teach.command import serving
 from sgimd_torch.teach.page import Page
 from sgimd_torch.teach.taught import TaughtRun

@@ -13,7 +13,7 @@ from sgimd_torch.runs.tasks import Task
 from sgimd_torch.spaces import Demonstration, stream
 from sgimd_torch.teach.leading import Leading
 from sgimd_torch.teach.led import arm_led, rod_led
-from sgimd_torch.teach.lessons import lesson_by_hand, resampled
+from sgimd_torch.teach.lessons import lesson_by_hand
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +69,7 @@ def test_what_the_robot_can_play_has_no_misfit_and_no_remark(rod):
     knots[:, 0] = knots[:, 1] = 0.5  # begins where movements begin
     knots[:, 2:] = 0.3 + 0.4 * knots[:, 2:]
     lesson = give(rod, played(rod, theta))
-    assert lesson.misfit == pytest.approx(0, abs=2e-3)  # resampled by straight lines
+    assert lesson.misfit == pytest.approx(0, abs=2e-3)
     np.testing.assert_allclose(lesson.theta_d, theta, atol=0.02)
     assert [remark for remark in lesson.remarks if "starts" not in remark] == []
 
@@ -141,12 +141,3 @@ def test_stillness_before_and_after_a_movement_is_left_out():
 def test_an_arm_that_did_not_move_teaches_nothing():
     with pytest.raises(ValueError, match="no joint moved"):
         moving(np.arange(201) / 100, np.zeros((201, 2)))
-
-
-def test_resampling_has_equal_steps_and_both_ends():
-    times = np.arange(130) / 100
-    even, joints = resampled(times, times[:, None])
-    assert len(even) == 66  # 64.5 steps of 1/50 s are 65
-    np.testing.assert_allclose(np.diff(even), even[1], rtol=1e-9)
-    np.testing.assert_allclose(joints[:, 0], even, atol=1e-12)
-    assert len(resampled(np.arange(201) / 100, np.zeros((201, 1)))[0]) == 101  # exact multiples get no more

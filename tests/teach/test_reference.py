@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from sgimd_torch.demonstrations import load_demonstrations
-from sgimd_torch.runs.build import build
-from sgimd_torch.runs.config import Config
+from sgimd_torch.options.build import build
+from sgimd_torch.options.config import Config
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.runs.run import Life
+from sgimd_torch.runs.run import RunLoop
 
 KEPT = 60
 LESSONS = {0: 0, 37: 5, 38: 10, 120: 15, 200: 20}  # number of movements before a lesson -> demonstration
@@ -24,7 +24,7 @@ def lived(seed, movements, out, *stops):
     shown = load_demonstrations()
     for last in [*stops, movements]:
         parts = build(config)
-        with Life(parts, resume=last != [*stops, movements][0]) as life:
+        with RunLoop(parts, resume=last != [*stops, movements][0]) as life:
             if not life.recorded:
                 parts.teacher.give(shown[LESSONS[0]])
             for episode in life.episodes():

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.runs.command_line import main as run
-from sgimd_torch.runs.config import Config, words
-from sgimd_torch.runs.process import command
+from sgimd_torch.options.command_line import main as run
+from sgimd_torch.options.config import Config, words
 from sgimd_torch.runs.read import read_run
+from sgimd_torch.runs.signals import command
 from sgimd_torch.runs.tasks.robots import arm_demonstrations
 from sgimd_torch.teach.by_hand import BY_HAND, ByHand
 from sgimd_torch.teach.command import main, options_of
@@ -52,8 +52,8 @@ def test_a_lesson_is_answered_at_once_and_the_map_is_better_where_it_landed(taug
     after = learning.show(SHOWN[120])
     assert (after.movements, after.lessons) == (30 + learning.config["social.repeats"], 1)
     box = learning.parts.environment.outcomes
-    column, row = ((SHOWN[120].outcome - box.low) / box.sides * after.chart.error.shape[0]).astype(int)
-    assert after.chart.error[row, column] < 0.05 < before.chart.error[row, column]
+    column, row = ((SHOWN[120].outcome - box.low) / box.sides * after.chart.distances.shape[0]).astype(int)
+    assert after.chart.distances[row, column] < 0.05 < before.chart.distances[row, column]
     learning.close()
     found = read_run(learning.config.directory)
     assert set(found.origin[30:]) == {"imitate"}

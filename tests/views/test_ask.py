@@ -7,8 +7,8 @@ import pytest
 
 from sgimd_torch import FishingRod, load_learner, practice, run
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.runs.command_line import main as run_main
-from sgimd_torch.runs.process import command
+from sgimd_torch.options.command_line import main as run_main
+from sgimd_torch.runs.signals import command
 from sgimd_torch.views.ask import main
 
 SHORT = ["--environment=planar-arm-7", "--algorithm=practice", "--seed=4", "--movements=60", "--evaluate-at=[]"]

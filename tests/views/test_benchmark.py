@@ -7,9 +7,9 @@ import pytest
 
 from runs import settle
 from sgimd_torch.evaluation import SIDES, load_benchmark, tile_side
-from sgimd_torch.runs.command_line import main as live
-from sgimd_torch.runs.process import command
+from sgimd_torch.options.command_line import main as live
 from sgimd_torch.runs.read import read_run
+from sgimd_torch.runs.signals import command
 from sgimd_torch.spaces import Box, stream
 from sgimd_torch.views.benchmark import main
 

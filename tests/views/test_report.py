@@ -14,9 +14,9 @@ from PIL import Image
 
 from pages import Page, rows_of
 from sgimd_torch.figures.learning import COLOURS
-from sgimd_torch.runs.command_line import parse
-from sgimd_torch.runs.process import command
+from sgimd_torch.options.command_line import parse
 from sgimd_torch.runs.read import read_run
+from sgimd_torch.runs.signals import command
 from sgimd_torch.spaces import Box
 from sgimd_torch.views.report import command as report
 from sgimd_torch.views.report import figures, provenance

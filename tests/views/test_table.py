@@ -11,9 +11,9 @@ import pytest
 
 from pages import rows_of as table_of
 from sgimd_torch.evaluation import Benchmark, save_benchmark
-from sgimd_torch.runs.command_line import main as live
-from sgimd_torch.runs.process import command
+from sgimd_torch.options.command_line import main as live
 from sgimd_torch.runs.read import read_run
+from sgimd_torch.runs.signals import command
 from sgimd_torch.views import variants
 from sgimd_torch.views.report import command as report
 from sgimd_torch.views.table import main

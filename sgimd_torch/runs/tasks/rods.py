@@ -8,18 +8,18 @@ from typing import Any, Final
 
 import numpy as np
 
-from sgimd_torch.catalogue.options import hands_on
 from sgimd_torch.demonstrations import SHIPPED as SHIPPED_DEMONSTRATIONS
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.evaluation import SHIPPED as SHIPPED_BENCHMARK
+from sgimd_torch.options.signature import with_keywords_of
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.spaces import Box, Demonstration
 
 LARGEST: Final = 1e6  # m, largest half side of T
 
 
-@hands_on(FishingRod, "noise", "max_wind", "line")
+@with_keywords_of(FishingRod, "noise", "max_wind", "line")
 def fishing_rod(*, task_space: float = 1.0, threads: int = 1, **physics: Any) -> Task:
     """Arm with a fishing rod, in MuJoCo: the paper's task.
 

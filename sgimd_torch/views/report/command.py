@@ -12,7 +12,7 @@ from pathlib import Path
 
 from sgimd_torch.files import write_text
 from sgimd_torch.record import RunError
-from sgimd_torch.runs.process import parser_of
+from sgimd_torch.runs.signals import parser_of
 from sgimd_torch.views.report.page import page
 from sgimd_torch.views.variants import Variant, best_first, read
 

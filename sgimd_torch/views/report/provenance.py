@@ -9,8 +9,8 @@ import shlex
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from sgimd_torch.runs.process import printable
 from sgimd_torch.runs.read import Run
+from sgimd_torch.runs.signals import printable
 from sgimd_torch.views.statistics import LEAST_SEEDS
 from sgimd_torch.views.variants import Variant, differing, shown
 

@@ -15,7 +15,7 @@ from functools import cache, wraps
 from pathlib import Path
 from typing import Any, Final, NamedTuple, TypeVar, cast
 
-from sgimd_torch.catalogue import WORDS, function_of
+from sgimd_torch.options.catalogue import WORDS, function_of
 
 F = TypeVar("F", bound=Callable[..., Any])
 _SIMPLE: Final = (int, float, bool, str, Path, type(None), ...)
@@ -65,7 +65,7 @@ def help_of(make: Callable[..., Any]) -> dict[str, str]:
 
     make = function_of(make)
     decorated = make.__init__ if inspect.isclass(make) else make
-    target = vars(decorated).get("hands_on") if inspect.isfunction(decorated) else None
+    target = vars(decorated).get("with_keywords_of") if inspect.isfunction(decorated) else None
     found = {} if target is None else help_of(target)
     text = inspect.getdoc(make) or ""
     for each in docstring_parser.parse(text, docstring_parser.DocstringStyle.GOOGLE).params:
@@ -74,7 +74,7 @@ def help_of(make: Callable[..., Any]) -> dict[str, str]:
     return found
 
 
-def hands_on(target: Callable[..., Any], *names: str, **changed: Any) -> Callable[[F], F]:
+def with_keywords_of(target: Callable[..., Any], *names: str, **changed: Any) -> Callable[[F], F]:
     """Decorator that lists the keywords of ``target`` in the signature of a function which passes ``**keywords`` to it.
 
     Args:
@@ -95,7 +95,7 @@ def hands_on(target: Callable[..., Any], *names: str, **changed: Any) -> Callabl
         def made(*arguments: Any, **keywords: Any) -> Any:
             return function(*arguments, **{**changed, **keywords})
 
-        vars(made).update(__signature__=inspect.Signature(every), hands_on=target)
+        vars(made).update(__signature__=inspect.Signature(every), with_keywords_of=target)
         return cast(F, made)
 
     return decorate
@@ -122,7 +122,7 @@ def _is_simple(kind: Any) -> bool:
     return kind in _SIMPLE
 
 
-def read(text: str, kind: Any) -> Any:
+def parsed(text: str, kind: Any) -> Any:
     """``text`` as a value of type ``kind``; a list may be typed with brackets or without.
 
     Raises:
@@ -132,11 +132,11 @@ def read(text: str, kind: Any) -> Any:
     if typing.get_origin(kind) is tuple:
         items = [item.strip() for item in text.removeprefix("[").removesuffix("]").split(",") if item]
         kinds = [inner[0]] * len(items) if ... in inner else inner
-        return tuple(read(*each) for each in zip(items, kinds, strict=True))
+        return tuple(parsed(*each) for each in zip(items, kinds, strict=True))
     if inner:  # a union, with None last
         if text == "null" and types.NoneType in inner:
             return None
-        return read(text, inner[0])
+        return parsed(text, inner[0])
     if kind is bool:
         return bool(("false", "true").index(text))
     if not text or (kind in (int, float) and "_" in text):  # Python would read 1_0 as 10

@@ -1,8 +1,8 @@
 """Settings of a run: options of the run itself, its parts, and options of the parts.
 
 Defaults are those of the library, so a run with one changed option is an ablation.
-    config = Config(algorithm="sagg-riac", parts={"goals": "grid", "goals.window": 12}); config["search.noise"]
-Options of a part are the keywords of its signature (`sgimd_torch.catalogue.options`). A keyword that is called like a
+    config = Config(algorithm="sagg-riac", parts={"goals.window": 12}); config["search.noise"]
+Options of a part are the keywords of its signature (`sgimd_torch.options.signature`). A keyword that is called like a
 kind of the catalogue, such as ``goals``, chooses another part.
 """
 
@@ -17,8 +17,8 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, Final, NamedTuple, Self
 
-from sgimd_torch.catalogue import PLACES, ROD, TAUGHT_BY, WORDS, did_you_mean, load_word, place_of, word_of
-from sgimd_torch.catalogue.options import Option, choices_of, options_of, parameters_of
+from sgimd_torch.options.catalogue import PLACES, ROD, TAUGHT_BY, WORDS, did_you_mean, load_word, place_of, word_of
+from sgimd_torch.options.signature import Option, choices_of, options_of, parameters_of
 
 OWN: Final = "own"  # name of the run's own inverse model
 FILES: Final = ("benchmark", "demonstrations", "begin_with")  # options that name a file
@@ -168,7 +168,7 @@ class Config:
     @property
     def settings(self) -> dict[str, Any]:
         """All options of this run as json values; ``from_settings`` makes the run from them."""
-        return plain({**self.values, **{name: getattr(self, name) for name in RUN}})
+        return as_json({**self.values, **{name: getattr(self, name) for name in RUN}})
 
     @classmethod
     def from_settings(cls, settings: Mapping[str, Any]) -> Self:
@@ -309,7 +309,7 @@ def words(config: Config) -> list[str]:
     """Arguments of ``sgimd run`` for a run: ``--dashed-name=value`` for the algorithm and each changed option."""
     own = {name: getattr(config, name) for name in RUN}
     own = {name: value for name, value in own.items() if value != RUN[name].default or name == "algorithm"}
-    return [f"--{dashed(name)}={typed(value)}" for name, value in {**own, **dict(config.parts)}.items()]
+    return [f"--{dashed(name)}={as_text(value)}" for name, value in {**own, **dict(config.parts)}.items()]
 
 
 def differ(one: Any, other: Any) -> bool:
@@ -322,13 +322,13 @@ def dashed(name: str) -> str:
     return name.replace("_", "-")
 
 
-def plain(value: Any) -> Any:
+def as_json(value: Any) -> Any:
     """Value of an option as a json value."""
     return json.loads(json.dumps(value, default=str))
 
 
-def typed(value: Any) -> str:
+def as_text(value: Any) -> str:
     """Value of an option as a user types it."""
     if isinstance(value, tuple):
-        return ",".join(map(typed, value)) or "[]"
+        return ",".join(map(as_text, value)) or "[]"
     return json.dumps(value) if value is None or isinstance(value, bool) else str(value)

@@ -3,7 +3,7 @@
     load_word("goals", "uniform")                 # UniformGoals, which is imported now
     load_word("goals", "mypackage.goals:Curious") # a class of your own
 To remove a feature, delete its folder and its lines of this table. The help text of a name is the first line of the
-docstring at its place. The options are keywords of the signature there (`sgimd_torch.catalogue.options`).
+docstring at its place. The options are keywords of the signature there (`sgimd_torch.options.signature`).
 """
 
 from __future__ import annotations
@@ -34,7 +34,6 @@ WORDS: Final[dict[str, dict[str, str]]] = {
         "sgim-im-search": "asking.algorithms:sgim_im_search",
         "sgim-acts": "asking.algorithms:sgim_acts",
         "sgim-acts-search": "asking.algorithms:sgim_acts_search",
-        "sgim-eer": "asking.algorithms:sgim_eer",
         "map-elites": "rivals.quality_diversity:map_elites_alone",
         "map-elites-taught": "rivals.quality_diversity:map_elites",
         "isoline": "rivals.quality_diversity:isoline_alone",
@@ -56,7 +55,6 @@ WORDS: Final[dict[str, dict[str, str]]] = {
         "uniform": "goals.uniform:UniformGoals",
         "within-reach": "goals.within_reach:WithinReach",
         "strategic": "asking.interest:StrategicInterest",
-        "entropy": "asking.entropy:EntropyGoals",
     },
     "progress": {
         "gained": "goals.regions:gained_progress",
@@ -71,9 +69,9 @@ WORDS: Final[dict[str, dict[str, str]]] = {
         "gradient": "forward_model.search:GradientSearch",
     },
     "explore": {
-        "anywhere": "explore.anywhere:Anywhere",
-        "widening": "explore.widening:Widening",
-        "returning": "explore.returning:Returning",
+        "anywhere": "searches.explore:Anywhere",
+        "widening": "searches.explore:Widening",
+        "returning": "searches.explore:Returning",
     },
     "inverse": {
         "linear": "inverses.locally_linear:LocallyLinear",
@@ -112,7 +110,7 @@ WORDS: Final[dict[str, dict[str, str]]] = {
         "high-half": "asking.teachers:high_half_teacher",
     },
     "command": {
-        "run": "runs.command_line",
+        "run": "options.command_line",
         "sweep": "runs.sweep",
         "check": "views.check",
         "demonstrations": "views.demonstrations",
@@ -215,7 +213,7 @@ def function_of(made: Callable[..., Any]) -> Callable[..., Any]:
     return function_of(made.func) if isinstance(made, partial) else made
 
 
-def called(what: str, make: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
+def call_checked(what: str, make: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
     """Result of a call of ``make``, which may be code of a user.
 
     Raises:

@@ -2,7 +2,7 @@
 
 Examples:
   sgimd run --algorithm sgim-d --seed 3 --resume              go on after Ctrl-C, or with more --movements
-  sgimd run --algorithm sagg-riac --goals grid --goals.window 12 --name grid --movements 2000
+  sgimd run --algorithm sagg-riac --goals uniform --name uniform --movements 2000
   sgimd run --environment mypackage.toss:make                 a run on your own robot
 """
 
@@ -14,24 +14,24 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from sgimd_torch.catalogue.options import Option, read, wanted
-from sgimd_torch.runs.config import FLAGS, RUN, Config, chosen, dashed
-from sgimd_torch.runs.process import Stopping, loading
+from sgimd_torch.options.config import FLAGS, RUN, Config, chosen, dashed
+from sgimd_torch.options.signature import Option, parsed, wanted
+from sgimd_torch.runs.signals import Stopping, loading
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """The command ``sgimd run``; returns 0 when the run has finished, or raises the errors of ``carry_out``."""
+    """The command ``sgimd run``; returns 0 when the run has finished, or raises the errors of ``run_one``."""
     argv = sys.argv[1:] if argv is None else argv
     config, flags = parse(argv, __doc__)
     program = ["sgimd"] if Path(sys.argv[0]).name == "sgimd" else [sys.executable, "-m", "sgimd_torch"]
     again = [*program, "run", *argv, *([] if flags["resume"] else ["--resume"])]
     with loading():
-        from sgimd_torch.runs.build import build  # imported here so that --help is fast
+        from sgimd_torch.options.build import build  # imported here so that --help is fast
         from sgimd_torch.runs.directory import with_found_earlier
-        from sgimd_torch.runs.run import carry_out
+        from sgimd_torch.runs.run import run_one
     parts = build(with_found_earlier(config))
     with Stopping() as stopping:
-        print(carry_out(parts, stopping, **flags, again=shlex.join(again)))
+        print(run_one(parts, stopping, **flags, again=shlex.join(again)))
     return 0
 
 
@@ -47,12 +47,12 @@ def parse(argv: Sequence[str], description: str | None = None) -> tuple[Config, 
         given, asked = _read(argv)
         choices = {"algorithm": Config.algorithm, **given}
         if "help" in asked:
-            from sgimd_torch.runs.help import help_on, overview  # imported here, as runs show no help
+            from sgimd_torch.options.help import help_on, overview  # imported here, as runs show no help
 
             print(help_on(chosen(choices)) if given else overview(description))
             raise SystemExit(0)
         options = RUN | {name: each for part in chosen(choices).values() for name, each in part.options.items()}
-        values = {name: _typed(name, text, options) for name, text in given.items()}
+        values = {name: _value(name, text, options) for name, text in given.items()}
         own = {name: values.pop(name) for name in RUN if name in values}
         return Config(**own, parts=values), {flag: flag in asked for flag in FLAGS}
     except ValueError as error:
@@ -88,13 +88,13 @@ def _read(argv: Sequence[str]) -> tuple[dict[str, str], set[str]]:
     return given, asked
 
 
-def _typed(name: str, text: str, options: Mapping[str, Option]) -> Any:
+def _value(name: str, text: str, options: Mapping[str, Option]) -> Any:
     """A typed value, converted to the type of its option; names of parts and values of unknown options stay text.
 
     Raises:
         ValueError: the value is of another type.
     """
     try:
-        return read(text, options[name].kind) if name in options else text
+        return parsed(text, options[name].kind) if name in options else text
     except ValueError as error:
         raise ValueError(f"--{dashed(name)} must be {wanted(options[name].kind)}, got {text}") from error

@@ -6,9 +6,9 @@ import textwrap
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from sgimd_torch.catalogue import WORDS, about
-from sgimd_torch.catalogue.options import Option, help_of, wanted
-from sgimd_torch.runs.config import FLAGS, RUN, Config, Part, dashed, typed
+from sgimd_torch.options.catalogue import WORDS, about
+from sgimd_torch.options.config import FLAGS, RUN, Config, Part, as_text, dashed
+from sgimd_torch.options.signature import Option, help_of, wanted
 
 _PARTS: Final = [kind for kind in WORDS if kind not in ("algorithm", "command")]
 _PLACES: Final = {"progress": "goals.progress", "choose": "teacher.choose"}  # options that choose parts of other parts
@@ -61,7 +61,7 @@ def _described(options: Mapping[str, Option], make: Callable[..., Any]) -> list[
     for name, option in options.items():
         said = described.get(name.rpartition(".")[2], "").replace("``", "").replace("None", "null").rstrip(".")
         typed_as = f"{wanted(option.kind).removesuffix(' or null')}; " if option.default is None else ""
-        found.append(_line(f"--{dashed(name)}", f"{said} ({typed_as}default: {typed(option.default)})"))
+        found.append(_line(f"--{dashed(name)}", f"{said} ({typed_as}default: {as_text(option.default)})"))
     return found
 
 

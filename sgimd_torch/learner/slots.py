@@ -9,7 +9,7 @@ from sgimd_torch.spaces import Array, AskingAttempt, Lesson, Move, Request
 
 
 @dataclass(eq=False)
-class Place:
+class RobotSlot:
     """The attempt of one robot.
 
     Args:

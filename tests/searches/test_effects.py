@@ -8,12 +8,11 @@ import pytest
 from experiments.toys import crawler, fetch, puck, toss, toy_benchmark, two_elbows
 from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.evaluation import evaluate
-from sgimd_torch.explore.effects import Effects
-from sgimd_torch.explore.returning import Returning
-from sgimd_torch.explore.widening import Widening
 from sgimd_torch.inverses.among_effects import AmongEffects
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.memory import Memory
+from sgimd_torch.searches.effects import Effects
+from sgimd_torch.searches.explore import Returning, Widening
 from sgimd_torch.session import run
 from worlds import NO_CONTEXT, problem
 

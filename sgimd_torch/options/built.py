@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC
 from typing import Any, Self
 
-from sgimd_torch.catalogue import called, function_of, place_of
+from sgimd_torch.options.catalogue import call_checked, function_of, place_of
 
 
 class Built(ABC):  # noqa: B024
@@ -28,7 +28,7 @@ class Built(ABC):  # noqa: B024
         name = function_of(make).__name__
         if missing := getattr(function_of(make), "__abstractmethods__", ()):
             raise ValueError(f"{name} has no {', '.join(sorted(missing))}, which every {kind} must have")
-        made: Any = called(f"{kind} {name}", make, *given)
+        made: Any = call_checked(f"{kind} {name}", make, *given)
         if not isinstance(made, cls):
             wanted = f"derive a class from {kind} of sgimd_torch.parts"
             raise ValueError(f"{name} must make a {kind}, made a {type(made).__name__}; {wanted}")

@@ -20,7 +20,7 @@ from functools import partial
 from types import FrameType
 from typing import Any, Final, Self, TextIO
 
-from sgimd_torch.catalogue.options import read, wanted
+from sgimd_torch.options.signature import parsed, wanted
 
 REPORT_EVERY: Final = 20.0  # s between two lines of progress if stderr is no terminal
 SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
@@ -92,18 +92,18 @@ def parser_of(name: str, about: str | None, **more: Any) -> argparse.ArgumentPar
     form = argparse.RawDescriptionHelpFormatter
     made = argparse.ArgumentParser(f"sgimd {name}", description=about, formatter_class=form, allow_abbrev=False, **more)
     for word, kind in {int: int, float: float, "numbers": tuple[float, ...]}.items():
-        made.register("type", word, partial(typed, kind=kind))
+        made.register("type", word, partial(parsed_argument, kind=kind))
     return made
 
 
-def typed(text: str, kind: Any) -> Any:
+def parsed_argument(text: str, kind: Any) -> Any:
     """The value that a word of the command line stands for.
 
     Raises:
         ArgumentTypeError: the word is of another type than ``kind``.
     """
     try:
-        return read(text, kind)
+        return parsed(text, kind)
     except ValueError:
         raise argparse.ArgumentTypeError(f"must be {wanted(kind)}, got {text.strip()!r}") from None
 

@@ -10,18 +10,15 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from sgimd_torch.catalogue import called, function_of, load_word
 from sgimd_torch.changes import check_watcher
 from sgimd_torch.environments.protocol import Environment, FromFiles
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.files import checksum
-from sgimd_torch.inverses.among_effects import AmongEffects
-from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Learner
-from sgimd_torch.learner.requests import Demonstrator
-from sgimd_torch.parts import Inverse, Teacher
+from sgimd_torch.options.catalogue import call_checked, function_of, load_word
+from sgimd_torch.options.config import ALGORITHM, OWN, Config
+from sgimd_torch.parts import Demonstrator, Inverse, Teacher
 from sgimd_torch.runs.at_once import check_at_once
-from sgimd_torch.runs.config import ALGORITHM, OWN, Config
 from sgimd_torch.runs.tasks import Task, benchmark_of
 from sgimd_torch.spaces import Demonstration, stream
 
@@ -56,9 +53,9 @@ class RunParts:
         return self.task.environment
 
     @property
-    def answers(self) -> dict[str, Inverse]:
+    def inverses(self) -> dict[str, Inverse]:
         """Inverse models for evaluations, by name, the run's own first; after a change of the robot they are others."""
-        return _answers(self.config, self.learner)
+        return _inverses(self.config, self.learner)
 
 
 def build(config: Config) -> RunParts:
@@ -101,13 +98,13 @@ def build(config: Config) -> RunParts:
         notes = [*notes, f"begins with {len(shown['prior'])} movements of {config.begin_with}, as far as they help"]
         begin_with_crc32 = checksum(config.begin_with)
     algorithm = f"algorithm {config.algorithm}"
-    learner = called(algorithm, config.constructor(ALGORITHM), task.environment, config.seed, **shown)
+    learner = call_checked(algorithm, config.constructor(ALGORITHM), task.environment, config.seed, **shown)
     if not isinstance(learner, Learner):
         raise ValueError(f"{algorithm} must return a Learner, got a {type(learner).__name__}")
-    if config.until is not None and not isinstance(learner.inverse, LocalProcess | AmongEffects):
+    if config.until is not None and not learner.inverse.says_how_sure:
         name = type(learner.inverse).__name__
         raise ValueError(f"--until needs an inverse model that says how sure it is, such as process; {name} does not")
-    _answers(config, learner)  # made now, so that their remarks are among the notes
+    _inverses(config, learner)  # made now, so that their remarks are among the notes
     check_watcher(learner)  # an answer may have a forward model
     return RunParts(
         config=config,
@@ -131,11 +128,11 @@ def task_of(config: Config) -> Task:
     Raises:
         ValueError: the environment cannot be built, or is no environment.
     """
-    task = called(f"environment {config['environment']}", config.constructor("environment"))
+    task = call_checked(f"environment {config['environment']}", config.constructor("environment"))
     return task if isinstance(task, Task) else Task(task)
 
 
-def _answers(config: Config, learner: Learner) -> dict[str, Inverse]:
+def _inverses(config: Config, learner: Learner) -> dict[str, Inverse]:
     problem, found = learner.problem, {OWN: learner.inverse}
     for word in config.evaluated_by[1:]:
         make = partial(Inverse.of, load_word("inverse", word), problem)

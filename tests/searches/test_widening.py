@@ -8,11 +8,10 @@ import pytest
 from experiments.toys import two_elbows
 from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.environments.fishing_rod import FishingRod
-from sgimd_torch.explore.returning import Returning
-from sgimd_torch.explore.widening import Widening
 from sgimd_torch.inverses.among_effects import AmongEffects
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.inverses.nearest import NearestNeighbour
+from sgimd_torch.searches.explore import Returning, Widening
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Box, Estimate
 from worlds import NO_CONTEXT, problem

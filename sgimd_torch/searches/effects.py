@@ -37,7 +37,7 @@ class Effects:
     def __init__(self, memory: Memory, outcome_noise: float) -> None:
         self.memory = memory
         self.noise = outcome_noise * np.sqrt(memory.outcome_dim)
-        self._looked = 0  # number of exemplars at the last search for a plateau
+        self._n_searched = 0  # number of exemplars at the last search for a plateau
         self._plateau: Array | None = None  # (1 + context_dim, outcome_dim)
         self._seen = 0
 
@@ -47,9 +47,9 @@ class Effects:
         n, size = len(self.memory), float(_FIRST)
         while size * _GROWTH <= n:
             size *= _GROWTH
-        if self._looked < int(size) <= n:
-            self._looked = int(size)
-            self._plateau = self._look()
+        if self._n_searched < int(size) <= n:
+            self._n_searched = int(size)
+            self._plateau = self._find_plateau()
             self._acted, self._seen = Memory(self.memory.context_dim, self.memory.theta_dim, self.memory.outcome_dim), 0
         if self._plateau is None:
             return None
@@ -59,9 +59,9 @@ class Effects:
         self._seen = n
         return self._acted
 
-    def _look(self) -> Array | None:
-        """The plateau of the first ``_looked`` exemplars; None if they have no plateau."""
-        n = self._looked
+    def _find_plateau(self) -> Array | None:
+        """The plateau of the first ``_n_searched`` exemplars; None if they have no plateau."""
+        n = self._n_searched
         outcomes = self.memory.outcomes[:n]
         self._scale = max(self.noise, _ROUNDING * float(np.sqrt(outcomes.var(axis=0).sum())))
         rng = stream(n, "plateau")
