@@ -24,4 +24,4 @@ def map_elites_middle(environment: Environment, seed: int) -> Learner:
         drawn = int(rng.integers(2**32))
         return [GaussianEmitter(archive, sigma=0.1, initial_solutions=first, batch_size=10, seed=drawn, **bounds)]
 
-    return quality_diversity.quality_diversity(environment, seed, "map-elites", emitters, cells=10)
+    return quality_diversity.quality_diversity(environment, seed, "map-elites", emitters, {}, cells=10)
