@@ -4,8 +4,6 @@ import os
 import subprocess
 import sys
 
-import pytest
-
 from runs import ROOT, about_of, content_of
 from sgimd_torch import PlanarArm
 from sgimd_torch.files import checksum
