@@ -13,7 +13,7 @@ from sgimd_torch.options.catalogue import WORDS, about, unknown
 from sgimd_torch.runs.signals import command, loading
 
 EXTRAS: Final = {
-    **dict.fromkeys(("demonstrations", "suite", "demo"), "plot"),
+    **dict.fromkeys(("demonstrations", "demo"), "plot"),
     **{name: name for name in ("report", "teach", "film")},
 }
 """The extra of the package that each of these commands needs."""

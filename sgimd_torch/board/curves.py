@@ -96,7 +96,7 @@ def of_regions(regions: Sequence[Region]) -> dict[str, float]:
 def branches(regions: Sequence[Region]) -> Mapping[str, list[Region]]:
     """The leaves below each node of the tree of regions, by the path of the node; deepest nodes are at level ``DEPTH``.
 
-    The cells of a `ProgressGrid`, such as "R.3.7", form no tree: "R" is their only node.
+    Cells that never split, such as "R.3.7", form no tree: "R" is their only node.
     """
     found: dict[str, list[Region]] = {}
     for region in regions:

@@ -23,15 +23,13 @@ _TABLE: Final = """
 algorithm    algorithms.paper           random=random_exploration sagg-riac observation imitation sgim-d
 algorithm    algorithms.practice        practice practice-taught
 algorithm    asking.algorithms          sgim-im sgim-im-search sgim-acts sgim-acts-search
-algorithm    rivals.quality_diversity   map-elites=map_elites_alone map-elites-taught=map_elites
-algorithm    rivals.quality_diversity   isoline=isoline_alone isoline-taught=isoline cma-me=cma_me_alone
-algorithm    rivals.quality_diversity   cma-me-taught=cma_me cma-mae=cma_mae_alone cma-mae-taught=cma_mae
-environment  runs.tasks.rods            fishing-rod rod-wind rod-long
-environment  runs.tasks.robots          planar-arm-7 planar-arm-50 swimmer half-reached
-environment  runs.tasks.toys            toss crawler two-elbows spatial-arm puck fetch
+algorithm    rivals.quality_diversity   map-elites=map_elites_alone map-elites-taught=map_elites isoline=isoline_alone
+algorithm    rivals.quality_diversity   isoline-taught=isoline cma-me=cma_me_alone cma-me-taught=cma_me
+algorithm    rivals.quality_diversity   cma-mae=cma_mae_alone cma-mae-taught=cma_mae
+environment  runs.tasks.rods            fishing-rod
+environment  runs.tasks.robots          planar-arm-7 planar-arm-50
 environment  environments.mujoco_robot  mujoco=MujocoRobot
 goals        goals.interest_map         interest-map=InterestMap
-goals        goals.progress_grid        grid=ProgressGrid
 goals        rivals.alp_gmm             alp-gmm=AlpGmm
 goals        goals.uniform              uniform=UniformGoals
 goals        goals.within_reach         within-reach=WithinReach
@@ -55,12 +53,11 @@ teacher      teachers                   periodic=PeriodicTeacher initial=Initial
 teacher      teach.by_hand              by-hand=ByHand
 choose       teachers                   least-explored random=at_random
 teachers     asking.teachers            all=AnsweringTeacher demonstrator-1 demonstrator-2 demonstrator-3
-teachers     asking.teachers            low-half=low_half_teacher high-half=high_half_teacher mislabelling slow
+teachers     asking.teachers            low-half=low_half_teacher high-half=high_half_teacher
 command      options.command_line       run
 command      runs.sweep                 sweep
 command      views.check                check
 command      views.demonstrations       demonstrations
-command      views.suite                suite
 command      views.benchmark            benchmark
 command      views.table                table
 command      views.report.command       report
@@ -161,7 +158,7 @@ def unknown(what: str, word: str, known: Collection[str], also: str = "") -> Val
 
 
 def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:
-    """A question such as ``; did you mean grid?`` with at most ``most`` similar names; empty if no name is similar."""
+    """A question such as ``; did you mean vary?`` with at most ``most`` similar names; empty if no name is similar."""
     spellings = {word.lower().replace("_", "-"): word for word in known}
     near = get_close_matches(name.lower().replace("_", "-"), spellings, most, 0.5)
     return f"; did you mean {' or '.join(spellings[word] for word in near)}?" if near else ""

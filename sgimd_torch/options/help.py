@@ -39,7 +39,7 @@ def overview(description: str | None) -> str:
 
 
 def help_on(choices: Mapping[str, str]) -> str:
-    """Text of ``sgimd run --goals grid --help``: options of the chosen parts."""
+    """Text of ``sgimd run --goals uniform --help``: options of the chosen parts."""
     parts = chosen({"algorithm": Config.algorithm, **choices})
     lines = [
         "This screen has the options of the chosen parts; "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 from sgimd_torch.files import replacing
 from sgimd_torch.learner import Learner
@@ -11,7 +11,7 @@ from sgimd_torch.learner.events import Kind
 from sgimd_torch.parts import Teacher
 from sgimd_torch.record import Record, ReplayError, RunError
 from sgimd_torch.record.replay import replay
-from sgimd_torch.spaces import Move
+from sgimd_torch.spaces import Episode, Move
 
 
 def save_life(learner: Learner, path: str | os.PathLike[str]) -> None:
@@ -58,6 +58,13 @@ def load_life(
         RuntimeError: the learner has lived already.
         RunError: there is no record at ``path``, or the record is damaged or of another robot.
     """
+    for episode in repeated(learner, path, teacher=teacher):
+        if after is not None:
+            after(episode.move)
+
+
+def repeated(learner: Learner, path: str | os.PathLike[str], *, teacher: Teacher | None = None) -> Iterator[Episode]:
+    """Let a learner repeat a saved life, one movement for each episode that is taken; see `load_life`."""
     if any(learner.events()) or not learner.idle:
         raise RuntimeError("load_life() needs a learner freshly built; this one has lived already")
     dims = learner.problem.dims
@@ -70,6 +77,4 @@ def load_life(
         begun = record.about.get("begun", 0)
         if begun != learner.begun:
             raise ReplayError(f"{path} began with {begun} exemplars in memory, this learner began with {learner.begun}")
-        for episode in replay(learner, record.events(), teacher=teacher):
-            if after is not None:
-                after(episode.move)
+        yield from replay(learner, record.events(), teacher=teacher)

@@ -26,7 +26,7 @@ from sgimd_torch.environments.protocol import primitive_of
 from sgimd_torch.files import write_text
 from sgimd_torch.options.build import RunParts
 from sgimd_torch.options.signature import parsed
-from sgimd_torch.runs.load import load_parts
+from sgimd_torch.runs.load import OpenRun
 from sgimd_torch.runs.signals import parser_of
 from sgimd_torch.spaces import Array, Box, stream
 
@@ -42,7 +42,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         OSError: a file cannot be read or written.
     """
     options = parser().parse_args(argv)
-    parts = load_parts(options.run, trust=options.trust)
+    run = OpenRun(options.run, trust=options.trust)
+    run.replay()
+    parts = run.parts
     box = parts.environment.outcomes
     goals = [*options.goal, *(_read(options.goals, box) if options.goals else [])]
     if not goals or (options.trajectory and len(goals) > 1):

@@ -189,6 +189,8 @@ def test_the_curves_of_a_run_are_those_of_its_record(watched):
         expected = dict(zip(read.evaluation["movements"], read.evaluation[column], strict=True))
         expected = {step: value for step, value in expected.items() if np.isfinite(value)}  # the floor: at the end only
         assert curves[f"error/{tag}"] == pytest.approx(expected, rel=1e-6)
+    shares = read.evaluation["goals_met"] / len(read.benchmark)
+    assert curves["goals/met"] == pytest.approx(dict(zip(read.evaluation["movements"], shares, strict=True)))
     first = read.origin[:50]
     for origin in np.unique(first):
         assert curves[f"regime/{origin}"][50] == pytest.approx((first == origin).mean())

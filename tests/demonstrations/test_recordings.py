@@ -11,7 +11,7 @@ import pytest
 
 from sgimd_torch.__main__ import _call
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
-from sgimd_torch.demonstrations.columns import Columns
+from sgimd_torch.demonstrations.columns import ColumnNames
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.protocol import SimulationError
 from sgimd_torch.runs.signals import command
@@ -257,7 +257,7 @@ def test_folders_without_texts_and_places_without_a_file_are_refused(tmp_path, c
 
 def test_columns_are_checked_before_anything_is_read():
     with pytest.raises(ValueError, match=r"'state\[a\]' does not name a column"):
-        Columns(joints=("state[a]",), outcome=("x",))
+        ColumnNames(joints=("state[a]",), outcome=("x",))
 
 
 STATE, PLACE = "observation.state", "observation.place"

@@ -59,11 +59,11 @@ def problem(
         outcomes = outcomes or Box.cube(-1, 1, t)
         at_rest = outcomes.clip(np.zeros(outcomes.dim)) if rest is None else np.array(rest, dtype=float)
         environment = Boxes(contexts or Box.cube(0, 1, c), policies or Box.cube(0, 1, p), outcomes, at_rest, noise)
-    found = Problem(environment, seed, inverse=inverse)
+    made = Problem(environment, seed, inverse=inverse)
     if memory is not None:
-        found = found.over(memory)
-        found.inverse = inverse(found)
-    return found
+        made = made.over(memory)
+        made.inverse = inverse(made)
+    return made
 
 
 def last_posture(times: Array, trajectory: Array) -> Array:

@@ -14,6 +14,7 @@ import check_physics
 import make_benchmark
 import make_demonstrations
 import make_teachers
+import mutants
 from sgimd_torch.algorithms.paper import random_exploration, sagg_riac, sgim_d
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.environments.fishing_rod import FishingRod
@@ -47,6 +48,7 @@ def go(script, options):
         (make_teachers, "--seed -1"),
         (make_teachers, "--out nowhere"),
         (make_teachers, "--runs 1 --processes 1 --movements 5 --n 6"),  # too few movements
+        (mutants, "nowhere"),
         (check_physics, "--movements 0"),
         (bench, "--rounds 0"),
         (bench, "--movements 0"),
@@ -56,7 +58,7 @@ def go(script, options):
 )
 def test_what_makes_no_sense_is_refused_and_nothing_is_written(tmp_path, monkeypatch, capsys, script, options):
     monkeypatch.chdir(tmp_path)
-    out = {bench: "", check_physics: "", make_teachers: "--out . "}.get(script, "--out out.npz ")
+    out = {bench: "", check_physics: "", mutants: "", make_teachers: "--out . "}.get(script, "--out out.npz ")
     with pytest.raises(SystemExit) as end:
         go(script, out + options)
     assert end.value.code == 2
@@ -149,12 +151,6 @@ def test_executed_again_without_noise_movements_land_where_they_did(pool):
     assert landed.shape == (make_teachers.EXECUTIONS, 2, 2)
     assert np.ptp(landed, axis=0).max() == 0
     assert np.ptp(make_teachers.execute_again(FishingRod(), pool[0][:2], stream(0, "test")), axis=0).min() > 0
-
-
-def test_a_pool_on_too_few_tiles_is_refused(pool):
-    thetas, outcomes = pool
-    with pytest.raises(ValueError, match="only 1 tiles have a movement to show, too few for --n 3"):
-        make_teachers.careful(FishingRod(), thetas[[0, 0, 0]], outcomes[[0, 0, 0]], 3, stream(0, "test"))
 
 
 INTERPRETER = """#!/usr/bin/env bash

@@ -94,9 +94,9 @@ def breach(place: str, name: str) -> str | None:
     room, (top, *rest) = room_of(place), name.split(".")
     if top != PACKAGE:
         allowed = LIBRARIES.get(top, ())
-        here = any(place == each or place.startswith(f"{each}/") for each in allowed)
+        may = any(place == owner or place.startswith(f"{owner}/") for owner in allowed)
         return (
-            None if here or top in sys.stdlib_module_names else f"{place} imports {name}, allowed in {sorted(allowed)}"
+            None if may or top in sys.stdlib_module_names else f"{place} imports {name}, allowed in {sorted(allowed)}"
         )
     target = room_of("/".join(rest[:2])) if rest and rest[0] in ROW else "__init__"
     if target == "__init__":
@@ -113,15 +113,15 @@ def breach(place: str, name: str) -> str | None:
 
 
 def breaches(package: Path) -> list[str]:
-    found = []
+    messages = []
     for path in sorted(package.rglob("*.py")):
         place = path.relative_to(package).with_suffix("").as_posix()
         room = room_of(place)
         if room not in ROW and place != "__init__":
-            found.append(f"{place} has no row yet: give it one in {Path(__file__).name}")
+            messages.append(f"{place} has no row yet: give it one in {Path(__file__).name}")
             continue
-        found += filter(None, (breach(place, name) for name in imports(path.read_text(encoding="utf-8"))))
-    return found
+        messages += filter(None, (breach(place, name) for name in imports(path.read_text(encoding="utf-8"))))
+    return messages
 
 
 def arrows(package: Path) -> dict[str, set[str]]:
@@ -131,15 +131,15 @@ def arrows(package: Path) -> dict[str, set[str]]:
         for path in package.rglob("*.py")
     }
     names = {name.removesuffix(".__init__"): name for name in files}
-    found = {}
+    graph = {}
     for name, path in files.items():
         wanted = set()
         for dotted in imports(path.read_text(encoding="utf-8")):
             while dotted and dotted not in names:
                 dotted = dotted.rpartition(".")[0]
             wanted |= {names[dotted]} if dotted else set()
-        found[name] = wanted - {name, f"{PACKAGE}.__init__"}
-    return found
+        graph[name] = wanted - {name, f"{PACKAGE}.__init__"}
+    return graph
 
 
 def circle(graph: dict[str, set[str]]) -> list[str]:
@@ -152,8 +152,8 @@ def circle(graph: dict[str, set[str]]) -> list[str]:
         if name in done:
             return []
         path.append(name)
-        for each in sorted(graph[name]):
-            if loop := visit(each):
+        for imported in sorted(graph[name]):
+            if loop := visit(imported):
                 return loop
         path.pop()
         done.add(name)

@@ -15,12 +15,9 @@ from sgimd_torch.environments.fishing_rod import HOLD, FishingRod
 from sgimd_torch.environments.mujoco_robot import MujocoRobot
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.sketch import Sketch
-from sgimd_torch.evaluation import evaluate
 from sgimd_torch.options import command_line
-from sgimd_torch.options.build import build
 from sgimd_torch.record import Record
 from sgimd_torch.runs.directory import FILE
-from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.signals import command
 from sgimd_torch.spaces import Box, stream
 from sgimd_torch.views import check
@@ -166,27 +163,6 @@ def test_an_interrupted_film_leaves_the_old_one_and_nothing_else(tmp_path):
     with pytest.raises(OSError, match="not encoded"):
         write_film(tmp_path / "film.mp4", [np.zeros((47, 63, 3), np.uint8)])  # odd
     assert [path.read_text() for path in tmp_path.iterdir()] == ["old"]
-
-
-@pytest.mark.parametrize("algorithm", ["sgim-d", "observation"])
-def test_the_memory_rebuilt_from_the_log_judges_as_the_living_one_did(tmp_path, go, algorithm):
-    assert go(tmp_path, "--algorithm", algorithm, "--movements", 40, "--evaluate_at", "35", "--repeats", 0) == 0
-    run = read_run(tmp_path / algorithm / "seed-003")
-    parts = build(film.config_of(run))
-    assert (run.demonstration[:35] >= 0).any()
-    film.remember(run, parts, 0, 20)
-    film.remember(run, parts, 20, 35)  # in two steps, as a film of several stages does
-    seen = evaluate(parts.inverses["own"], parts.environment, parts.benchmark.goals, 3, 35, repeats=0)
-    assert seen.mean_error == run.evaluation["mean_error"][0]
-
-
-def test_a_forward_model_learns_again_what_it_learnt_in_the_run(tmp_path, go):
-    assert go(tmp_path, "--inverse", "model", "--movements", 80, "--evaluate_at", "[]") == 0
-    run = read_run(tmp_path / "sgim-d" / "seed-003")
-    parts = build(film.config_of(run))
-    film.remember(run, parts, 0, 60)
-    film.remember(run, parts, 60, 80)
-    assert run.refreshes["relative_error"][-1] == parts.learner.inverse.model.relative_error
 
 
 @pytest.mark.parametrize(
