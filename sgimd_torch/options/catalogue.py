@@ -1,6 +1,6 @@
 """The catalogue: every name that the command line knows, with the place of its class, function or module.
 
-    load_word("goals", "grid")                    # ProgressGrid, which is imported now
+    load_word("goals", "uniform")                 # UniformGoals, which is imported now
     load_word("goals", "mypackage.goals:Curious") # a class of your own
 To remove a feature, delete its folder and its lines of this table. The help text of a name is the first line of the
 docstring at its place. The options are keywords of the signature there (`sgimd_torch.options.signature`).
@@ -45,23 +45,12 @@ WORDS: Final[dict[str, dict[str, str]]] = {
     },
     "environment": {
         ROD: "runs.tasks.rods:fishing_rod",
-        "rod-wind": "runs.tasks.rods:rod_wind",
-        "rod-long": "runs.tasks.rods:rod_long",
         "planar-arm-7": "runs.tasks.robots:planar_arm_7",
         "planar-arm-50": "runs.tasks.robots:planar_arm_50",
-        "swimmer": "runs.tasks.robots:swimmer",
-        "half-reached": "runs.tasks.robots:half_reached",
-        "toss": "runs.tasks.toys:toss",
-        "crawler": "runs.tasks.toys:crawler",
-        "two-elbows": "runs.tasks.toys:two_elbows",
-        "spatial-arm": "runs.tasks.toys:spatial_arm",
-        "puck": "runs.tasks.toys:puck",
-        "fetch": "runs.tasks.toys:fetch",
         "mujoco": "environments.mujoco_robot:MujocoRobot",
     },
     "goals": {
         "interest-map": "goals.interest_map:InterestMap",
-        "grid": "goals.progress_grid:ProgressGrid",
         "alp-gmm": "rivals.alp_gmm:AlpGmm",
         "uniform": "goals.uniform:UniformGoals",
         "within-reach": "goals.within_reach:WithinReach",
@@ -119,15 +108,12 @@ WORDS: Final[dict[str, dict[str, str]]] = {
         "demonstrator-3": "asking.teachers:demonstrator_3",
         "low-half": "asking.teachers:low_half_teacher",
         "high-half": "asking.teachers:high_half_teacher",
-        "mislabelling": "asking.teachers:mislabelling",
-        "slow": "asking.teachers:slow",
     },
     "command": {
         "run": "options.command_line",
         "sweep": "runs.sweep",
         "check": "views.check",
         "demonstrations": "views.demonstrations",
-        "suite": "views.suite",
         "benchmark": "views.benchmark",
         "table": "views.table",
         "report": "views.report.command",
@@ -146,7 +132,7 @@ TAUGHT_BY: Final = {
 }
 # The extra of the package that each of these commands needs.
 EXTRAS: Final = {
-    **dict.fromkeys(("demonstrations", "suite", "demo"), "plot"),
+    **dict.fromkeys(("demonstrations", "demo"), "plot"),
     **{name: name for name in ("report", "teach", "film")},
 }
 _PACKAGE: Final = Path(__file__).parents[1]
@@ -250,7 +236,7 @@ def unknown(what: str, word: str, known: Collection[str], also: str = "") -> Val
 
 
 def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:
-    """A question such as ``; did you mean grid?`` with at most ``most`` similar names; empty if no name is similar."""
+    """A question such as ``; did you mean vary?`` with at most ``most`` similar names; empty if no name is similar."""
     spelt = {each.lower().replace("_", "-"): each for each in known}
     near = get_close_matches(name.lower().replace("_", "-"), spelt, most, 0.5)
     return f"; did you mean {' or '.join(spelt[each] for each in near)}?" if near else ""

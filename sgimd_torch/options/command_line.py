@@ -2,7 +2,7 @@
 
 Examples:
   sgimd run --algorithm sgim-d --seed 3 --resume              go on after Ctrl-C, or with more --movements
-  sgimd run --algorithm sagg-riac --goals grid --goals.window 12 --name grid --movements 2000
+  sgimd run --algorithm sagg-riac --goals uniform --name uniform --movements 2000
   sgimd run --environment mypackage.toss:make                 a run on your own robot
 """
 

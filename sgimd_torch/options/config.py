@@ -1,7 +1,7 @@
 """Settings of a run: options of the run itself, its parts, and options of the parts.
 
 Defaults are those of the library, so a run with one changed option is an ablation.
-    config = Config(algorithm="sagg-riac", parts={"goals": "grid", "goals.window": 12}); config["search.noise"]
+    config = Config(algorithm="sagg-riac", parts={"goals.window": 12}); config["search.noise"]
 Options of a part are the keywords of its signature (`sgimd_torch.options.signature`). A keyword that is called like a
 kind of the catalogue, such as ``goals``, chooses another part.
 """

@@ -38,7 +38,7 @@ def overview(description: str | None) -> str:
 
 
 def help_on(parts: Mapping[str, Part]) -> str:
-    """Text of ``sgimd run --goals grid --help``: options of the chosen parts."""
+    """Text of ``sgimd run --goals uniform --help``: options of the chosen parts."""
     lines = [
         "This screen has the options of the chosen parts; "
         "sgimd run --help has the options of every run, such as --seed.",

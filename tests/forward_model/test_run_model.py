@@ -250,7 +250,7 @@ def test_the_board_shows_how_the_model_does_and_explains_it(reference):
 def test_a_run_that_learns_a_model_but_answers_without_it_is_evaluated_by_both(tmp_path, live):
     options = ("--search", "gradient", "--inverse", "linear", "--evaluated-by", "own,nearest,linear,model-alone")
     assert live(tmp_path, *options) == 0
-    answers = read_run(tmp_path / "sgim-d" / "seed-003").answers
-    assert list(answers) == ["own", "nearest", "linear", "model-alone"]
-    errors = {answer: each["mean_error"].tolist() for answer, each in answers.items()}
+    evaluations = read_run(tmp_path / "sgim-d" / "seed-003").evaluations
+    assert list(evaluations) == ["own", "nearest", "linear", "model-alone"]
+    errors = {inverse: columns["mean_error"].tolist() for inverse, columns in evaluations.items()}
     assert errors["own"] == errors["linear"] != errors["model-alone"]
