@@ -38,7 +38,7 @@ MAY_CHANGE: Final = (
 checksums: the demonstrations must be equal, the benchmark may be another one."""
 LONGEST: Final = 504  # bytes, longest path of a file that SQLite opens
 LIBRARIES: Final = ("numpy", "scipy", "faiss-cpu", "mujoco")
-FORWARD: Final = ("torch", "lightning", "safetensors")  # libraries of a forward model
+FORWARD: Final = ("torch", "lightning")  # libraries of a forward model
 EVALUATED: Final = ("evaluations", "errors", "regions")  # tables that each evaluation adds to
 OF_MODEL: Final = ("predictions", "refreshes")  # tables that a forward model adds to
 

@@ -98,7 +98,7 @@ def _last_common(runs: Sequence[Run]) -> int:
     Raises:
         RunError: no evaluation is common to all runs.
     """
-    moments = [set(run.answers["own"]["movements"].tolist()) for run in runs]
+    moments = [set(run.evaluations["own"]["movements"].tolist()) for run in runs]
     common = set.intersection(*moments) if moments else {0}
     if not common:
         if not any(moments):
