@@ -27,8 +27,8 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from sgimd_torch.options.config import MAY_CHANGE
 from sgimd_torch.record import RunError
+from sgimd_torch.runs.directory import MAY_CHANGE
 from sgimd_torch.runs.read import Run
 from sgimd_torch.runs.signals import parser_of, say
 from sgimd_torch.views.results import Column, print_csv, print_latex, print_table, results

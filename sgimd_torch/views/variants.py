@@ -21,8 +21,7 @@ from tqdm import tqdm
 from sgimd_torch.evaluation import RECENT
 from sgimd_torch.figures.names import label
 from sgimd_torch.options.catalogue import unknown
-from sgimd_torch.options.config import PLACE
-from sgimd_torch.runs.directory import FILE
+from sgimd_torch.runs.directory import FILE, PLACE
 from sgimd_torch.runs.read import Run, find_runs, read_run
 from sgimd_torch.runs.signals import say
 from sgimd_torch.spaces import Array

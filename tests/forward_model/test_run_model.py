@@ -114,7 +114,7 @@ def test_a_run_that_is_killed_and_resumed_ends_as_if_it_never_was(tmp_path, argu
 
 
 def test_a_run_without_a_model_writes_no_record_of_one_and_loads_no_library_for_it(tmp_path, arguments):
-    heavy = {"torch", "lightning", "safetensors", "tensorboard", "matplotlib"}
+    heavy = {"torch", "lightning", "tensorboard", "matplotlib"}
     loaded = f"{heavy} & set(sys.modules)"
     program = f"{RUN}; code = command_line.main(sys.argv[1:]); print({loaded}); sys.exit(code)"
     process = start(program, *arguments(tmp_path, "--movements", 60))
