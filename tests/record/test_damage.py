@@ -124,7 +124,7 @@ def test_damage_is_told_with_its_row_only_where_it_is_read(tmp_path):
 
 
 # Runs with rows in every table: with contexts, a model, and teachers who are asked.
-ALL = "--environment toss --algorithm sgim-acts-search --teachers all --inverse model"
+ALL = "--environment experiments.toys:toss --algorithm sgim-acts-search --teachers all --inverse model"
 SHORT = "--movements 110 --evaluate_at 60 --repeats 2 --inverse.rate 0.5 --inverse.members 2"
 
 

@@ -6,9 +6,9 @@ import mujoco
 import numpy as np
 import pytest
 
+from experiments.toys import toss
 from sgimd_torch.environments.fishing_rod import JOINTS, FishingRod
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.environments.toys import toss
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.spaces import Box, stream
 from sgimd_torch.teach.arm import STEP
@@ -225,7 +225,7 @@ def test_nonsense_is_refused_and_changes_nothing(leading, name, value):
 def test_tasks_say_what_can_be_led(rod):
     assert hand_led_of(Task(rod, correspondence=rod.primitive.correspondence)).joints == JOINTS
     assert hand_led_of(Task(PlanarArm(3))).joints == ("joint_0", "joint_1", "joint_2")
-    ball = toss()
+    ball = toss().environment
     with pytest.raises(ValueError, match=r"Toy cannot be led by the hand.*give it an attribute hand_led"):
         hand_led_of(Task(ball))
     with pytest.raises(ValueError, match="FishingRod has no correspondence"):

@@ -121,7 +121,7 @@ def test_a_learner_that_nobody_can_teach_by_hand_is_refused_before_anything_is_w
 
 
 def test_a_task_without_anything_to_lead_says_why(capsys):
-    assert command(main, ["--environment", "toss"]) == 2
+    assert command(main, ["--environment", "experiments.toys:toss"]) == 2
     assert "Toy cannot be led by the hand" in capsys.readouterr().err
 
 

@@ -20,7 +20,7 @@ from sgimd_torch.runs.signals import command
 from sgimd_torch.spaces import Box
 from sgimd_torch.views.report import command as report
 from sgimd_torch.views.report import figures, provenance
-from sgimd_torch.views.report.page import page
+from sgimd_torch.views.report.command import page
 from sgimd_torch.views.statistics import interquartile_mean
 from sgimd_torch.views.variants import Variant
 
@@ -135,13 +135,13 @@ def test_the_numbers_of_a_variant_are_interquartile_means_over_its_seeds(pages, 
 
 
 def test_a_run_that_has_hardly_begun_is_reported_and_one_that_was_never_evaluated_comes_last(run, tmp_path):
-    nothing = {name: column[:0] for name, column in run.answers["own"].items()}
+    nothing = {name: column[:0] for name, column in run.evaluations["own"].items()}
     begun = replace(
         run,
         **{name: getattr(run, name)[:0] for name in ("index", "origin", "demonstration", "contexts", "goals")},
         outcomes=run.outcomes[:0],
         demonstrations=[],
-        answers={"own": nothing},
+        evaluations={"own": nothing},
         regions=None,
         summary={**run.summary, "movements": 0, "finished": False},
     )
@@ -163,7 +163,7 @@ def test_a_run_without_evaluations_is_judged_by_its_own_goals(run, tmp_path):
         origin=np.array(["local"] * 6),
         failed=np.arange(6) == 5,
         demonstration=np.full(6, -1),
-        answers={"own": {name: column[:0] for name, column in run.answers["own"].items()}},
+        evaluations={"own": {name: column[:0] for name, column in run.evaluations["own"].items()}},
         regions=None,
         tolerance=0.02,
         summary={**run.summary, "movements": 6, "failed": 1},
@@ -186,7 +186,7 @@ def test_errors_are_those_of_finished_runs_and_unfinished_ones_are_named(runs, r
     cut = replace(other, index=other.index[:25], summary={**other.summary, "finished": False})
     variant = Variant("sgim-d", [run, cut])
     assert variant.used == [run]
-    assert f"{cut.path}: 25 of 60 movements" in "".join(provenance.doubts([variant]))
+    assert f"{cut.path}: 25 of 60 movements" in "".join(provenance.warnings([variant]))
     assert Variant("sgim-d", [cut]).used == [cut]  # if there is nothing better
 
 
@@ -215,9 +215,9 @@ def made(run, name, errors):
     """Runs like ``run`` with these last errors (m), one for each seed from 0 on."""
     runs = []
     for seed, error in enumerate(errors):
-        evaluation = {**run.answers["own"], "mean_error": np.array([0.5, error])}
+        evaluation = {**run.evaluations["own"], "mean_error": np.array([0.5, error])}
         config = {**run.config, "seed": seed}
-        runs.append(replace(run, config=config, answers={**run.answers, "own": evaluation}))
+        runs.append(replace(run, config=config, evaluations={**run.evaluations, "own": evaluation}))
     return Variant(name, runs)
 
 
@@ -286,7 +286,7 @@ def test_the_commands_make_the_same_runs_again(pages, runs):
 )
 def test_doubtful_versions_are_reported(run, commits, warning):
     made_by = [replace(run, versions={**run.versions, "commit": commit}) for commit in commits]
-    (few, *said) = provenance.doubts([Variant("sgim-d", made_by)])
+    (few, *said) = provenance.warnings([Variant("sgim-d", made_by)])
     assert "Fewer than 5 seeds" in few
     assert len(said) == bool(warning)
     assert warning in "".join(said)
@@ -301,7 +301,7 @@ def test_doubtful_versions_are_reported(run, commits, warning):
 )
 def test_what_cannot_be_compared_is_said(run, change, warning):
     other = replace(run, **{name: {**getattr(run, name), **values} for name, values in change.items()})
-    assert warning in "".join(provenance.doubts([Variant("sgim-d", [run, other])])).replace("SGIM-D", "sgim-d")
+    assert warning in "".join(provenance.warnings([Variant("sgim-d", [run, other])])).replace("SGIM-D", "sgim-d")
 
 
 def test_the_same_runs_give_the_same_page(runs, pages, tmp_path):
