@@ -111,21 +111,6 @@ def test_a_run_that_another_process_writes_is_left_alone(tmp_path, go, benchmark
     assert content_of(tmp_path / "sgim-d" / "seed-003") == reference
 
 
-def test_a_run_made_longer_executes_nothing_again_for_its_evaluations(tmp_path, go, reference, monkeypatch, capsys):
-    assert go(tmp_path, "--movements", 50) == 0  # evaluated after 30 and, at its end, 50
-    evaluated = set()
-
-    def evaluate_and_note(*arguments, **options):
-        evaluated.add(arguments[4])
-        return evaluate(*arguments, **options)
-
-    monkeypatch.setattr(evaluations, "evaluate", evaluate_and_note)
-    assert go(tmp_path, "--resume") == 0
-    assert evaluated == {60, 90}
-    assert "evaluations after 50 movements are dropped" in capsys.readouterr().err
-    assert content_of(tmp_path / "sgim-d" / "seed-003") == reference
-
-
 @pytest.mark.parametrize(("algorithm", "end"), [("observation", 50), ("sgim-d", 60)])
 def test_a_finished_run_made_longer_equals_a_long_run(tmp_path, go, algorithm, end):
     """The long run is not evaluated after 50 movements; after 60 it is, but the noise is not measured there."""
@@ -138,37 +123,42 @@ def test_a_finished_run_made_longer_equals_a_long_run(tmp_path, go, algorithm, e
     assert read_run(extended).config["movements"] == MOVEMENTS
 
 
-def test_resuming_a_finished_run_changes_nothing_but_what_is_asked_of_its_evaluation(tmp_path, go, reference):
-    directory = tmp_path / "sgim-d" / "seed-003"
-    assert go(tmp_path) == go(tmp_path, "--resume") == 0
-    assert content_of(directory) == reference
-    assert go(tmp_path, "--resume", "--evaluate_at", "45", "--repeats", 3) == 0
-    assert read_run(directory).evaluation["movements"].tolist() == [45, 90]
-    assert go(tmp_path, "--resume", "--evaluate_at", "45,60", "--repeats", 3) == 0  # one more, between them
-    assert read_run(directory).evaluation["movements"].tolist() == [45, 60, 90]
-    assert go(tmp_path, "--resume") == 0
-    assert content_of(directory) == reference
+WHOLE = [(30, 0), (60, 0), (90, 2)]  # numbers of movements before each evaluation, and of its repeats
+WALKS = {  # options of each start of a run, and the evaluations for which it executes movements
+    "longer": [("--movements 50", [(30, 0), (50, 2)]), ("", [(60, 0), (90, 2)])],
+    "other moments": [
+        ("", WHOLE),
+        ("", []),
+        ("--evaluate_at 45 --repeats 3", [(45, 0), (90, 3)]),
+        ("--evaluate_at 45,60 --repeats 3", [(60, 0), (90, 3)]),
+        ("", WHOLE),
+    ],
+    "other floors": [
+        ("--movements 60 --floor_at 30,90", [(30, 2), (60, 0)]),
+        ("--floor_at 30,90", [(90, 2)]),
+        ("--floor_at 30,90", []),
+        ("--floor_at 90", WHOLE),
+        ("", WHOLE),  # null: only the end
+    ],
+}
 
 
-def test_a_resumed_run_keeps_its_evaluations_until_floor_at_changes(tmp_path, go, reference, monkeypatch):
+@pytest.mark.parametrize("walk", WALKS)
+def test_a_resumed_run_makes_only_the_evaluations_that_are_missing_or_asked_for(
+    tmp_path, go, reference, monkeypatch, walk
+):
     evaluated = []
 
     def evaluate_and_note(inverse, environment, goals, seed, movements, **options):
-        if not isinstance(inverse, LocallyLinear):  # the other answer, which never measures the noise
+        if not isinstance(inverse, LocallyLinear):  # the other inverse model, which never measures the noise
             evaluated.append((movements, options["repeats"]))
         return evaluate(inverse, environment, goals, seed, movements, **options)
 
     monkeypatch.setattr(evaluations, "evaluate", evaluate_and_note)
-    assert go(tmp_path, "--movements", 60, "--floor_at", "30,90") == 0
-    assert evaluated == [(30, 2), (60, 0)]
-    assert go(tmp_path, "--resume", "--floor_at", "30,90") == 0
-    assert evaluated == [(30, 2), (60, 0), (90, 2)]
-    assert go(tmp_path, "--resume", "--floor_at", "30,90") == 0
-    assert len(evaluated) == 3
-    assert go(tmp_path, "--resume", "--floor_at", "90") == 0
-    assert evaluated[3:] == [(30, 0), (60, 0), (90, 2)]
-    assert go(tmp_path, "--resume") == 0  # null: only the end
-    assert evaluated[6:] == [(30, 0), (60, 0), (90, 2)]
+    for k, (options, executed) in enumerate(WALKS[walk]):
+        assert go(tmp_path, *options.split(), *["--resume"] * (k > 0)) == 0
+        assert evaluated == executed
+        evaluated.clear()
     assert content_of(tmp_path / "sgim-d" / "seed-003") == reference
 
 
