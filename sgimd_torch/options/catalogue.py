@@ -44,7 +44,7 @@ WORDS: Final[dict[str, dict[str, str]]] = {
         "cma-mae-taught": "rivals.quality_diversity:cma_mae",
     },
     "environment": {
-        ROD: "runs.tasks.rods:fishing_rod",
+        ROD: "runs.tasks.robots:fishing_rod",
         "planar-arm-7": "runs.tasks.robots:planar_arm_7",
         "planar-arm-50": "runs.tasks.robots:planar_arm_50",
         "mujoco": "environments.mujoco_robot:MujocoRobot",
