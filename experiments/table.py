@@ -110,9 +110,9 @@ def result_rows(config: Config, run: Run) -> list[Row]:
     """
     rows: list[Row] = []
     key = {"variant": config.variant, "seed": config.seed, "task": task_name(config)}
-    for answer, found in run.answers.items():
-        name = own_answer(config) if answer == OWN else answer
-        evaluations = (found[column].tolist() for column in ("movements", "mean_error", "noise_floor"))
+    for inverse, evaluation in run.evaluations.items():
+        name = own_answer(config) if inverse == OWN else inverse
+        evaluations = (evaluation[column].tolist() for column in ("movements", "mean_error", "noise_floor"))
         for movements, error, floor in zip(*evaluations, strict=True):
             rows.append({**key, "movements": movements, "answer": name, "error": error, "floor": floor})
     return rows

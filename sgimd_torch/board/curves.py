@@ -37,8 +37,8 @@ class Behaviour:
         """Count a movement."""
         move, self._movements = episode.move, episode.index + 1
         self._demonstrations += episode.demonstration is not None
-        regime = "failed" if episode.failed else "rest" if move is None else move.origin
-        self._since[f"regime/{regime}"] += 1
+        kind = "failed" if episode.failed else "rest" if move is None else move.origin
+        self._since[f"kind/{kind}"] += 1
         if episode.request is not None:
             self._answered += episode.reply == "shown"
             self._since[f"strategy/{episode.request.strategy}"] += 1
@@ -51,7 +51,7 @@ class Behaviour:
 
     def curves(self) -> dict[str, float]:
         """Values of the curves by tag: shares and means since the last call, counts since the first movement."""
-        total = sum(n for tag, n in self._since.items() if tag.startswith("regime/"))
+        total = sum(n for tag, n in self._since.items() if tag.startswith("kind/"))
         values = {tag: n / total for tag, n in self._since.items()}
         self._since = Counter(dict.fromkeys(self._since, 0))  # known tags keep their curves, at 0
         values["teacher/demonstrations"] = self._demonstrations

@@ -32,6 +32,7 @@ def go(script, options):
         (make_demonstrations, "--seed -1"),
         (make_demonstrations, "--out nowhere/demonstrations.npz"),
         (mutants, "nowhere"),
+        (mutants, "--commit nowhere"),
         (check_physics, "--movements 0"),
         (bench, "--rounds 0"),
         (bench, "--movements 0"),
