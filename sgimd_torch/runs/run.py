@@ -44,23 +44,23 @@ def run_one(parts: RunParts, stopping: Stopping, *, resume: bool, again: str) ->
         Failed: the run failed after its beginning.
         Stopped: a signal stopped the run.
     """
-    with RunLoop(parts, resume=resume) as life:
+    with RunLoop(parts, resume=resume) as loop:
         try:
-            life.go_on(stopping)
+            loop.go_on(stopping)
         except Stopped:
-            say(f"stopped after {life.movements} movements; to go on: {again}")
+            say(f"stopped after {loop.movements} movements; to go on: {again}")
             raise
         except (ReplayError, RunError) as error:
             raise RunError(str(error)) from error
         except OSError as error:
-            raise Failed(f"{life.record.path} cannot be written: {reason_of(error)}; to go on: {again}") from error
+            raise Failed(f"{loop.record.path} cannot be written: {reason_of(error)}; to go on: {again}") from error
         except (Exception, SystemExit) as error:  # an error of a part, or too many failed movements
             raised = error.__cause__ if isinstance(error, NoOutcomeError) and error.__cause__ else error
             if not isinstance(raised, SimulationError):
                 say("".join(traceback.format_exception(raised)).rstrip())
             said = str(error) if raised is not error else reason_of(error)
-            raise Failed(f"{said}; {life.movements} movements are kept; to go on: {again}") from error
-        return life.summary
+            raise Failed(f"{said}; {loop.movements} movements are kept; to go on: {again}") from error
+        return loop.summary
 
 
 class RunLoop:
@@ -96,7 +96,7 @@ class RunLoop:
             board = BoardListener(parts.config.directory, parts, self.seconds.summary, self._curves)
             self.listeners.append(board)
         self._wanted = parts.config.evaluations  # numbers of movements before the evaluations to come
-        self._committed = time.monotonic()
+        self._committed_at = time.monotonic()
 
     def __enter__(self) -> Self:
         return self
@@ -185,16 +185,16 @@ class RunLoop:
 
     def commit(self) -> None:
         """Write everything to the disk, unless another program is reading the record: then later."""
-        self._committed = time.monotonic()
-        if self._committed_now():
+        self._committed_at = time.monotonic()
+        if self._try_commit():
             for listener in self.listeners:
                 listener.flush()
 
     def _keep(self) -> None:
         """Write the last movements to the disk, as soon as no other program reads the record."""
-        if not self.replaying and not self._committed_now():
+        if not self.replaying and not self._try_commit():
             say(f"waiting until no other program reads {self.record.path}, to write the last movements")
-            while not self._committed_now():
+            while not self._try_commit():
                 time.sleep(COMMIT_EVERY)
 
     def _stop_if(self, stopping: Stopping) -> None:
@@ -211,7 +211,7 @@ class RunLoop:
         """Numbers of the listeners for the board since the last call, by tag."""
         return {tag: value for listener in self.listeners for tag, value in listener.curves().items()}
 
-    def _committed_now(self) -> bool:
+    def _try_commit(self) -> bool:
         self.record.about["seconds"] = self.seconds.summary()
         return self.record.commit(wait=False)
 
@@ -230,7 +230,7 @@ class RunLoop:
             self._evaluate()
         if self.movements == self.recorded:
             self._begin()
-        if not self.replaying and time.monotonic() - self._committed >= COMMIT_EVERY:
+        if not self.replaying and time.monotonic() - self._committed_at >= COMMIT_EVERY:
             self.commit()
 
     def _ends_early(self) -> bool:
@@ -297,8 +297,8 @@ class Listener(Protocol):
 class Listening(Protocol):
     """A trained part of a learner that has a listener in a run."""
 
-    def listener(self, life: RunLoop) -> Listener:
-        """The listener in the run ``life``."""
+    def listener(self, loop: RunLoop) -> Listener:
+        """The listener in the run of this ``loop``."""
 
 
 class Seconds:

@@ -258,7 +258,7 @@ def test_a_program_that_reads_the_record_all_the_time_stops_no_run(tmp_path, go,
     path, after, commit = (
         tmp_path / "sgim-d" / "seed-003" / FILE,
         run_module.RunLoop._after,
-        run_module.RunLoop._committed_now,
+        run_module.RunLoop._try_commit,
     )
     viewers, last = [], []
 
@@ -277,7 +277,7 @@ def test_a_program_that_reads_the_record_all_the_time_stops_no_run(tmp_path, go,
         return done
 
     monkeypatch.setattr(run_module.RunLoop, "_after", look)
-    monkeypatch.setattr(run_module.RunLoop, "_committed_now", committed)
+    monkeypatch.setattr(run_module.RunLoop, "_try_commit", committed)
     assert go(tmp_path) == 0
     assert "waiting until no other program reads" in capsys.readouterr().err
     assert content_of(path.parent) == reference
