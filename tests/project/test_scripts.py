@@ -147,8 +147,7 @@ def test_of_several_movements_the_one_that_lands_most_alike_is_the_most_reliable
 
 
 def test_executed_again_without_noise_movements_land_where_they_did(pool):
-    rod = FishingRod(noise=0.0)
-    landed = make_teachers.execute_again(rod, pool[0][:2], stream(0, "test"))
+    landed = make_teachers.execute_again(FishingRod(noise=0.0), pool[0][:2], stream(0, "test"))
     assert landed.shape == (make_teachers.EXECUTIONS, 2, 2)
     assert np.ptp(landed, axis=0).max() == 0
     assert np.ptp(make_teachers.execute_again(FishingRod(), pool[0][:2], stream(0, "test")), axis=0).min() > 0
