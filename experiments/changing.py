@@ -34,6 +34,7 @@ from sgimd_torch.runs.signals import command
 from sgimd_torch.runs.tasks import benchmark_of
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Array, stream
+from suite import TASKS
 
 AFTER: Final = (100, 250, 500, 1000)  # movements after the change at which a learner is evaluated
 BEGUN: Final = (50, *AFTER)  # movements after a simulator
@@ -92,7 +93,8 @@ def life(name: str, change: str, learner: str, seed: int) -> dict[int, tuple[flo
     """Errors by number of movements after the change, and how many changes the learner has noticed by then."""
     if change == SIMULATOR:
         return life_after_simulator(learner, seed)
-    made, anew = load_word("environment", name)(), learner == ANEW
+    place = TASKS[name].options["environment"] if name in TASKS else name
+    made, anew = load_word("environment", place)(), learner == ANEW
     goals = benchmark_of(made, None)[0].goals
     at = 0 if anew else ROBOTS[name]
     world = Changing(made.environment, "none" if anew and change == "undone" else change, at)

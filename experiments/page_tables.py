@@ -14,7 +14,7 @@ from claimed import SUITE, on, paper
 from evidence import LAST, Evidence, NotRun, Statistic
 from judging import MISSING, Claim, Verdict, judge
 from sgimd_torch.views.statistics import show
-from sgimd_torch.views.suite import TASKS, UNIFORM, titled
+from suite import TASKS, UNIFORM, titled
 from table import read_table
 from variants import ARMS, EXPERIMENTS, VARIANTS
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from sgimd_torch.demonstrations import SHIPPED, load_demonstrations, save_demonstrations
 from sgimd_torch.files import make_folder
-from sgimd_torch.views.suite import REFERENCES, TASKS, UNIFORM
+from suite import REFERENCES, TASKS, UNIFORM
 
 Variant = dict[str, Any]
 ARMS: Final = ("planar-arm-7", "planar-arm-50")
@@ -83,7 +83,9 @@ MODEL: Final[dict[str, Variant]] = {
 # Learners that ask.
 IM: Final[Variant] = {"algorithm": "sgim-im"}
 ACTS: Final[Variant] = {"algorithm": "sgim-acts"}
-FOUR: Final = ("demonstrator-1", "demonstrator-2", "demonstrator-3", "mislabelling")
+MISLABELLING: Final = "mislabelling"  # name of this teacher in asked.csv
+RECORDED: Final = ("demonstrator-1", "demonstrator-2", "demonstrator-3")
+FOUR: Final = (*RECORDED, MISLABELLING)
 HALVES: Final = ("low-half", "high-half")
 
 
@@ -208,12 +210,12 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
                 "sgim-im-83": {**IM, "demonstrations": MANY},
                 "sgim-im-cost-10": {**IM, "cost": 10.0},
                 **{f"sgim-acts-{number}": {**ACTS, "teachers": (f"demonstrator-{number}",)} for number in (1, 2)},
-                "sgim-acts-four": {**ACTS, "teachers": FOUR},
+                "sgim-acts-four": {**ACTS, "teachers": (*RECORDED, f"experiments.mislabelling:{MISLABELLING}")},
                 "sgim-acts-halves": {**ACTS, "teachers": HALVES},
             }.items()
         },
         "sgim-im.toss": {**IM, **TASKS["toss"].options, **SHORT},
-        "practice.toss-blind": {**PRACTICE, "environment": "experiments.parts:blind_toss", **SHORT},
+        "practice.toss-blind": {**PRACTICE, "environment": "experiments.toys:blind_toss", **SHORT},
     },
 }
 VARIANTS: Final = {name: line for variants in EXPERIMENTS.values() for name, line in variants.items()}

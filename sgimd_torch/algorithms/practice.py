@@ -99,5 +99,5 @@ def _families(
         inverse, parts = AmongEffects, {**parts, "search": Vary}
     own = Problem(environment, int(stream(seed, "narrow family").integers(2**63)), inverse=inverse)
     narrow = GoalBabbling(own, **{**parts, "explore": Widening})
-    problem.remarks += [each for each in own.remarks if each not in problem.remarks]
+    problem.remarks += [remark for remark in own.remarks if remark not in problem.remarks]
     return TwoFamilies(wide, narrow)

@@ -80,7 +80,7 @@ def sgim_acts(
         if emulates and babbling.budget > 1:
             emulate = Emulate(problem, strategy=AUTONOMOUS)
             asking[f"emulate {teacher}"] = Asking(teacher, emulate, cost, demonstrator.takes)
-    return Learner(problem, StrategicBabbling(problem, babbling, asking), correspondence=correspondence)
+    return Learner(problem, StrategicBabbling(babbling, asking), correspondence=correspondence)
 
 
 sgim_im = partial(sgim_acts, emulates=False)

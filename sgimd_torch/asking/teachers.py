@@ -39,14 +39,6 @@ def high_half(demonstrations: Sequence[Demonstration], rng: np.random.Generator)
     return [shown for shown in demonstrations if shown.outcome[0] >= middle(demonstrations)]
 
 
-def mislabelled(demonstrations: Sequence[Demonstration], rng: np.random.Generator) -> Sequence[Demonstration]:
-    """All demonstrations, each with the outcome of another demonstration, so that every stated outcome is wrong."""
-    shift = 1 + int(rng.integers(max(1, len(demonstrations) - 1)))
-    order = rng.permutation(len(demonstrations))
-    labels = {int(row): demonstrations[label].outcome for row, label in zip(order, np.roll(order, shift), strict=True)}
-    return [replace(shown, outcome=labels[row]) for row, shown in enumerate(demonstrations)]
-
-
 def _recorded(number: int, demonstrations: Sequence[Demonstration], rng: np.random.Generator) -> list[Demonstration]:
     here = demonstrations[0]
     theirs = load_demonstrations(SHIPPED.with_name(f"demonstrator_{number}.npz"))
@@ -63,8 +55,8 @@ class AnsweringTeacher(Demonstrator):
     Args:
         demonstrations: demonstrations to choose from.
         rng: random stream of ``knows``, which is called once.
-        knows: function that chooses the demonstrations of this teacher: `everything`, `low_half`, `high_half`,
-            `mislabelled`, or a function of your own.
+        knows: function that chooses the demonstrations of this teacher: `everything`, `low_half`, `high_half`, or a
+            function of your own.
         within: distance in C x T beyond which there is no reply.
         takes: number of movements for which the learner rests until the reply has come.
 
@@ -99,10 +91,6 @@ low_half_teacher = partial(AnsweringTeacher, knows=low_half)
 """Has the lower half of the demonstrations, by the first outcome coordinate."""
 high_half_teacher = partial(AnsweringTeacher, knows=high_half)
 """Has the upper half of the demonstrations, by the first outcome coordinate."""
-mislabelling = partial(AnsweringTeacher, knows=mislabelled)
-"""Has all demonstrations, but states a wrong outcome for each."""
-slow = partial(AnsweringTeacher, takes=10)
-"""Has all demonstrations; the learner rests for 10 movements until the reply comes."""
 demonstrator_1 = partial(AnsweringTeacher, knows=partial(_recorded, 1))
 """Has the recordings of the rod's demonstrator 1."""
 demonstrator_2 = partial(AnsweringTeacher, knows=partial(_recorded, 2))

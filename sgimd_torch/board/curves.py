@@ -37,8 +37,8 @@ class Behaviour:
         """Count a movement."""
         move, self._movements = episode.move, episode.index + 1
         self._demonstrations += episode.demonstration is not None
-        regime = "failed" if episode.failed else "rest" if move is None else move.origin
-        self._since[f"regime/{regime}"] += 1
+        kind = "failed" if episode.failed else "rest" if move is None else move.origin
+        self._since[f"kind/{kind}"] += 1
         if episode.request is not None:
             self._answered += episode.reply == "shown"
             self._since[f"strategy/{episode.request.strategy}"] += 1
@@ -51,7 +51,7 @@ class Behaviour:
 
     def curves(self) -> dict[str, float]:
         """Values of the curves by tag: shares and means since the last call, counts since the first movement."""
-        total = sum(n for tag, n in self._since.items() if tag.startswith("regime/"))
+        total = sum(n for tag, n in self._since.items() if tag.startswith("kind/"))
         values = {tag: n / total for tag, n in self._since.items()}
         self._since = Counter(dict.fromkeys(self._since, 0))  # known tags keep their curves, at 0
         values["teacher/demonstrations"] = self._demonstrations
@@ -96,7 +96,7 @@ def of_regions(regions: Sequence[Region]) -> dict[str, float]:
 def branches(regions: Sequence[Region]) -> Mapping[str, list[Region]]:
     """The leaves below each node of the tree of regions, by the path of the node; deepest nodes are at level ``DEPTH``.
 
-    The cells of a `ProgressGrid`, such as "R.3.7", form no tree: "R" is their only node.
+    Cells that never split, such as "R.3.7", form no tree: "R" is their only node.
     """
     found: dict[str, list[Region]] = {}
     for region in regions:

@@ -21,7 +21,7 @@ LEGEND: Final[Mapping[str, str]] = {
     "interest": "Recent change of competence in a region, eq. (3). The learner draws more goals where interest is "
     "high. After a cut of a region, its curve is the mean over its parts' goals.",
     "regions": "Number of regions of the goal model.",
-    "regime": "Share of each kind of movement since the last point: global exploration, local optimisation, imitation, "
+    "kind": "Share of each kind of movement since the last point: global exploration, local optimisation, imitation, "
     "babbling, rest, or failed movements.",
     "goals/met": "Share of the benchmark goals whose error is at most half the side of a benchmark tile.",
     "goals/reached": "Share of the last 50 goals of the learner that a movement reached within the tolerance.",

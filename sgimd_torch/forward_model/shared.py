@@ -23,7 +23,7 @@ from sgimd_torch.runs.signals import say
 from sgimd_torch.spaces import Array, Episode
 
 LEVEL: Final = 0.8  # share of outcomes that the predicted regions should contain, for the board's model/coverage
-NOT_ASKED: Final = "the forward model is not used, the learner goes on without it"
+NOT_USED: Final = "the forward model is not used, the learner goes on without it"
 
 
 class SharedModel(Trained):
@@ -105,26 +105,27 @@ class ModelListener(Listener):
         if refresh is None:
             return
         error = self._model.relative_error
-        learnt = refresh.steps, refresh.held_out, error, int(refresh.diverged)
-        self._record.add_rows("refreshes", [(movements, len(memory), *learnt)])
-        self._curves = {"model/relative_error": error, "model/held_out": refresh.held_out, "model/steps": refresh.steps}
+        fit = refresh.fit
+        row = movements, len(memory), fit.steps, fit.loss, error, int(fit.diverged)
+        self._record.add_rows("refreshes", [row])
+        self._curves = {"model/relative_error": error, "model/held_out": fit.loss, "model/steps": fit.steps}
         if refresh.predicted is not None:
             self._predicted(refresh.first, memory.outcomes[refresh.first :], refresh.predicted)
-        news = ["training diverged; the forward model keeps its last good weights"] if refresh.diverged else []
+        news = ["training diverged; the forward model keeps its last good weights"] if fit.diverged else []
         asked = self._uses_model()
         if asked != self._asked:
             self._asked = asked
-            who = "the forward model is used from here on" if asked else NOT_ASKED
+            who = "the forward model is used from here on" if asked else NOT_USED
             news.append(f"{who}: {self._how_wrong(error)}")
         if not replayed:
-            say(*(f"movement {movements}: {each}" for each in news))
+            say(*(f"movement {movements}: {message}" for message in news))
 
     def close(self) -> None:
         """Print a message if the model is not used."""
         if not self._asked:
             trained = self._model.trained
             why = self._how_wrong(self._model.relative_error) if trained else "there were too few exemplars to train it"
-            say(f"{NOT_ASKED}: {why}")
+            say(f"{NOT_USED}: {why}")
 
     def curves(self) -> dict[str, float]:
         """Numbers of the last refresh by tag of the board; empty if they were read before."""
@@ -133,7 +134,7 @@ class ModelListener(Listener):
 
     def _predicted(self, first: int, outcomes: Array, predicted: Prediction) -> None:
         values = np.hstack((outcomes, *predicted)).tolist()
-        self._record.add_rows("predictions", ((row, *each) for row, each in enumerate(values, first)))
+        self._record.add_rows("predictions", ((row, *columns) for row, columns in enumerate(values, first)))
         spread = np.hypot(predicted.epistemic, predicted.aleatoric)
         self._curves["model/error"] = float(np.linalg.norm(outcomes - predicted.mean, axis=1).mean())
         self._curves["model/coverage"] = coverage(outcomes, predicted.mean, spread, LEVEL)

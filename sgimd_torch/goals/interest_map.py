@@ -118,9 +118,9 @@ class InterestMap(Goals):
         cuts = np.quantile(region.points, np.arange(1, self.cuts + 1) / (self.cuts + 1), axis=0)  # (cuts, dim)
         is_below = region.points[:, None] < cuts  # (n, cuts, dim)
         n_below = is_below.sum(axis=0)
-        few = np.minimum(n_below, n - n_below) < self.g_max / 20
-        thin = np.minimum(cuts - region.low, region.high - cuts) < _MIN_SIDE * side
-        valid, shares = ~few & ~thin, side / self._tiling.box.sides
+        is_sparse = np.minimum(n_below, n - n_below) < self.g_max / 20
+        is_thin = np.minimum(cuts - region.low, region.high - cuts) < _MIN_SIDE * side
+        valid, shares = ~is_sparse & ~is_thin, side / self._tiling.box.sides
         valid &= shares * self.max_aspect >= shares.max(where=valid.any(axis=0), initial=0.0)
 
         def score(candidate: tuple[int, int]) -> tuple[float, float, int]:

@@ -86,11 +86,11 @@ class Tiling:
 
     def _choose(self, context: Array) -> Region:
         """A region that contains the context, drawn with the probabilities of eq. (4)."""
-        here = np.flatnonzero(self.containing(context))
-        interests = np.array([self.regions[index].interest() for index in here])
+        indices = np.flatnonzero(self.containing(context))
+        interests = np.array([self.regions[index].interest() for index in indices])
         weights = interests - interests.min()  # eq. (4)
         # Deviation: eq. (4) is 0/0 if all interests are equal. Then weights are the volumes in T, so goals are uniform.
         if not weights.any():
-            sides = (self._highs - self._lows)[here, self.problem.contexts.dim :]
+            sides = (self._highs - self._lows)[indices, self.problem.contexts.dim :]
             weights = (sides / self.problem.outcomes.sides).prod(axis=1)
-        return self.regions[int(self._rng.choice(here, p=weights / weights.sum()))]
+        return self.regions[int(self._rng.choice(indices, p=weights / weights.sum()))]

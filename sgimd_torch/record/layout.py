@@ -40,7 +40,7 @@ def layout(dims: Dims) -> dict[str, list[str]]:
         _vector(name, dim) for name, dim in (("context", c), ("theta", p), ("goal", t), ("outcome", t))
     )
     words = ["demonstration INTEGER", "who TEXT", "strategy TEXT", "reply TEXT", "place INTEGER"]
-    evaluated = ["movements INTEGER", "answer TEXT"]
+    evaluated = ["movements INTEGER", "inverse TEXT"]
     numbers = ["mean_error", "median_error", "p90_error", "noise_floor", "expected_error"]
     predicted = [column for name in ("predicted", "epistemic", "aleatoric") for column in _vector(name, t)]
     learnt = ["held_out REAL", "relative_error REAL", "diverged INTEGER"]

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from sgimd_torch.evaluation import OwnGoals
 from sgimd_torch.files import checksum
 from sgimd_torch.learner.events import Kind
-from sgimd_torch.options.config import FILES, OWN, PLACE, Config, code_of, differ
+from sgimd_torch.options.config import OWN, Config, differ
 from sgimd_torch.record import DERIVED, Record, RunError, layout
-from sgimd_torch.runs.directory import FILE, with_found_earlier
+from sgimd_torch.runs.directory import FILE, FILES, PLACE, code_of, with_found_earlier
 from sgimd_torch.spaces import Array, Box, Demonstration
 
 Columns = dict[str, np.ndarray]
@@ -47,7 +47,7 @@ class Run:
         demonstration: ``(n,)`` indices in ``demonstrations`` of what was shown just before each movement; -1: nothing.
         failed: ``(n,)``, whether each movement failed.
         contexts, thetas, goals, outcomes: ``(n, dim)`` vectors of each movement; NaN stands for none.
-        answers: columns of the table ``evaluations``, by inverse model.
+        evaluations: columns of the table ``evaluations``, by inverse model.
         errors: columns of the errors at all goals in all evaluations.
         benchmark: ``(n_goals, outcome_dim)`` benchmark goals.
         demonstrations: each demonstration that was shown, once.
@@ -74,7 +74,7 @@ class Run:
     thetas: Array
     goals: Array
     outcomes: Array
-    answers: dict[str, Columns]
+    evaluations: dict[str, Columns]
     errors: Columns = field(default_factory=dict)
     benchmark: Array = field(default_factory=lambda: np.empty((0, 0)))
     demonstrations: list[Demonstration] = field(default_factory=list)
@@ -88,19 +88,19 @@ class Run:
     @property
     def evaluation(self) -> dict[str, Array]:
         """Columns of the evaluations of the run's own inverse model."""
-        return self.answers[OWN]
+        return self.evaluations[OWN]
 
-    def at(self, movements: int, column: str = "mean_error", answer: str = OWN) -> float:
+    def at(self, movements: int, column: str = "mean_error", inverse: str = OWN) -> float:
         """One number of the evaluation after ``movements`` movements, NaN if there is no such evaluation."""
-        evaluation = self.answers.get(answer)
+        evaluation = self.evaluations.get(inverse)
         if evaluation is None:
             return float("nan")
         found = evaluation[column][evaluation["movements"] == movements]
         return float(found[0]) if len(found) else float("nan")
 
-    def missed_by(self, movements: int, answer: str = OWN) -> tuple[Array, Array]:
+    def missed_by(self, movements: int, inverse: str = OWN) -> tuple[Array, Array]:
         """Errors ``(n_goals,)`` of an evaluation, and those that the learner expected; NaN: it did not say."""
-        now = (self.errors["movements"] == movements) & (self.errors["answer"] == answer)
+        now = (self.errors["movements"] == movements) & (self.errors["inverse"] == inverse)
         return self.errors["error"][now], self.errors["expected"][now]
 
     def own_goals(self) -> OwnGoals:
@@ -173,7 +173,7 @@ def read_run(path: str | os.PathLike[str]) -> Run:
             **about.get("seconds", {}),
         },
         **arrays,
-        answers=_by_answer(found["evaluations"]),
+        evaluations=_by_inverse(found["evaluations"]),
         errors=found["errors"],
         benchmark=np.stack(list(found["goals"].values())[1:], axis=1),
         demonstrations=shown,
@@ -290,10 +290,10 @@ def movements_on_disk(path: Path) -> int:
         return 0
 
 
-def _by_answer(columns: Columns) -> dict[str, Columns]:
+def _by_inverse(columns: Columns) -> dict[str, Columns]:
     """The evaluations of each inverse model, by its name; the run's own inverse model is always there, as ``OWN``."""
-    words = columns["answer"]
+    words = columns["inverse"]
     return {
-        word: {name: values[words == word] for name, values in columns.items() if name != "answer"}
+        word: {name: values[words == word] for name, values in columns.items() if name != "inverse"}
         for word in dict.fromkeys((OWN, *words.tolist()))
     }

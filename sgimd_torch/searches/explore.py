@@ -146,8 +146,8 @@ class Returning(Explore):
             self._varied, self._seen = [], len(self.problem.memory)
         if not len(acted) or self.rng.random() < _ANYWHERE:
             return policies.sample(self.rng)
-        alike = np.linalg.norm(acted.contexts - context, axis=1).argsort(kind="stable")
-        theta = acted.thetas[self.rng.choice(alike[:_SIMILAR] if acted.context_dim else alike)]
+        order = np.linalg.norm(acted.contexts - context, axis=1).argsort(kind="stable")
+        theta = acted.thetas[self.rng.choice(order[:_SIMILAR] if acted.context_dim else order)]
         varied = policies.clip(self.rng.normal(theta, self.width.sd * policies.sides))
         self._varied.append(varied)
         return varied

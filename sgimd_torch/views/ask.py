@@ -31,7 +31,7 @@ from sgimd_torch.runs.signals import parser_of
 from sgimd_torch.spaces import Array, Box, stream
 
 Answer = dict[str, Array]
-"""Vectors of an answer, by the names "goal", "context", "theta", "expected", "off" and "reached"."""
+"""Vectors of an answer, by the names "goal", "context", "theta", "expected", "expected_deviation" and "reached"."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -56,7 +56,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         for answer in answers:
             print("; ".join(f"{name} {_text(value)}" for name, value in answer.items() if len(value)))
         return 0
-    heads = [name if name == "off" else f"{name}_{k}" for name, value in answers[0].items() for k in range(len(value))]
+    heads = [
+        name if name == "expected_deviation" else f"{name}_{k}"
+        for name, value in answers[0].items()
+        for k in range(len(value))
+    ]
     _write(options.out, heads, (np.concatenate([*answer.values()]) for answer in answers))
     print(f"{len(answers)} answers: {options.out}")
     return 0
@@ -96,7 +100,7 @@ def _answers(
         if expected is not None:
             answer["expected"] = expected
         if estimate.sd is not None:
-            answer["off"] = np.array([estimate.off])
+            answer["expected_deviation"] = np.array([estimate.expected_deviation])
         if execute:
             answer["reached"] = robot.execute(context, theta, stream(parts.config.seed, "ask", k))
         yield answer

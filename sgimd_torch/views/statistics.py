@@ -1,4 +1,4 @@
-"""Statistics over seeds: interquartile means, bootstrap intervals, probability of improvement, Holm's method.
+"""Statistics over seeds: interquartile means, bootstrap intervals, probability of improvement.
 
 Agarwal et al. (2021), "Deep reinforcement learning at the edge of the statistical precipice": with few seeds, every
 number needs an interval. ``errors`` are mean benchmark errors (m), one for each seed; smaller is better.
@@ -7,15 +7,14 @@ number needs an interval. ``errors`` are mean benchmark errors (m), one for each
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Mapping
-from typing import Final, NamedTuple, TypeVar
+from collections.abc import Callable, Mapping
+from typing import Final, NamedTuple
 
 import numpy as np
 from scipy import optimize, stats
 
 from sgimd_torch.spaces import Array
 
-Key = TypeVar("Key", bound=Hashable)
 LEVEL = 0.95
 RESAMPLES = 9999
 LEAST_SEEDS: Final = 5  # smallest number of seeds for an interval and a verdict
@@ -73,7 +72,7 @@ def interval(
         samples: arrays ``(n_seeds, *rest)``.
         rng: stream of the bootstrap.
         paired: whether all samples have the same seeds in the same order, so that seeds are drawn jointly.
-        level: confidence level; see `holm`.
+        level: confidence level.
 
     Raises:
         ValueError: a sample has fewer than 2 seeds or is not finite, or paired samples differ in length.
@@ -167,28 +166,6 @@ def improvement_interval(ours: Array, theirs: Array, *, level: float = LEVEL) ->
     low = optimize.brentq(excess, 0.0, inside) if found > 0 else 0.0
     high = optimize.brentq(excess, inside, 1.0) if found < 1 else 1.0
     return Interval(found, low, high)
-
-
-def holm(claims: Iterable[Key], rejects: Callable[[Key, float], bool]) -> set[Key]:
-    """The claims that are accepted jointly: the probability that any accepted claim is wrong is at most 5 %.
-
-    Holm's method (1979) with intervals: all claims are tested at Bonferroni's level for their number. Accepted claims
-    are set aside, and the remaining claims are tested again at the level for their own number.
-
-    Args:
-        claims: all claims that were considered, also those without a chance.
-        rejects: function of a claim and a confidence level; true if the interval at this level decides the claim.
-    """
-    left = list(dict.fromkeys(claims))
-    standing: set[Key] = set()
-    while left:
-        level = 1 - (1 - LEVEL) / len(left)
-        decided = {claim for claim in left if rejects(claim, level)}
-        if not decided:
-            break
-        standing |= decided
-        left = [claim for claim in left if claim not in decided]
-    return standing
 
 
 def common_differences(ours: Mapping[int, float], theirs: Mapping[int, float]) -> Array:

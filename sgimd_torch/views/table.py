@@ -27,8 +27,8 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from sgimd_torch.options.config import MAY_CHANGE
 from sgimd_torch.record import RunError
+from sgimd_torch.runs.directory import MAY_CHANGE
 from sgimd_torch.runs.read import Run
 from sgimd_torch.runs.signals import parser_of, say
 from sgimd_torch.views.results import Column, results
@@ -98,7 +98,7 @@ def _last_common(runs: Sequence[Run]) -> int:
     Raises:
         RunError: no evaluation is common to all runs.
     """
-    moments = [set(run.answers["own"]["movements"].tolist()) for run in runs]
+    moments = [set(run.evaluations["own"]["movements"].tolist()) for run in runs]
     common = set.intersection(*moments) if moments else {0}
     if not common:
         if not any(moments):

@@ -21,8 +21,7 @@ from tqdm import tqdm
 from sgimd_torch.evaluation import RECENT
 from sgimd_torch.figures.names import label
 from sgimd_torch.options.catalogue import unknown
-from sgimd_torch.options.config import PLACE
-from sgimd_torch.runs.directory import FILE
+from sgimd_torch.runs.directory import FILE, PLACE
 from sgimd_torch.runs.read import Run, find_runs, read_run
 from sgimd_torch.runs.signals import say
 from sgimd_torch.spaces import Array
@@ -66,13 +65,13 @@ def differing(variants: Sequence[Variant]) -> dict[str, list[str]]:
     """Settings in which runs differ, except the seed and the folders, with the values of each variant as text."""
     found = {}
     for name in dict.fromkeys(name for variant in variants for run in variant.runs for name in run.config):
-        values = [dict.fromkeys(shown(run.config.get(name)) for run in variant.runs) for variant in variants]
+        values = [dict.fromkeys(text_of(run.config.get(name)) for run in variant.runs) for variant in variants]
         if name not in PLACE and len(set().union(*values)) > 1:
             found[name] = [" or ".join(each) for each in values]
     return found
 
 
-def shown(value: Any) -> str:
+def text_of(value: Any) -> str:
     """A value of a setting or version as text, a dash for None."""
     return "–" if value is None else value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
 
@@ -94,12 +93,12 @@ class Variant:
         self.runs = sorted(runs, key=lambda run: int(run.config["seed"]))
         self.algorithm = str(self.runs[0].config["algorithm"])
         self.environment, self.space = str(self.runs[0].config["environment"]), self.runs[0].spaces["outcomes"]
-        evaluated = [run for run in self.runs if len(run.answers["own"]["movements"])]
+        evaluated = [run for run in self.runs if len(run.evaluations["own"]["movements"])]
         if at is None:
             self.used = [run for run in evaluated if run.summary["finished"]] or evaluated
         else:
-            self.used = [run for run in evaluated if at in run.answers["own"]["movements"]]
-        moments = [run.answers["own"]["movements"] for run in self.used]
+            self.used = [run for run in evaluated if at in run.evaluations["own"]["movements"]]
+        moments = [run.evaluations["own"]["movements"] for run in self.used]
         self.evaluated: NDArray[np.int64] = reduce(np.intersect1d, moments or [np.empty(0)]).astype(np.int64)
         self.last = at or (int(self.evaluated[-1]) if len(self.evaluated) else 0)  # number of movements
 

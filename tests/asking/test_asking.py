@@ -6,9 +6,10 @@ from collections import Counter
 import numpy as np
 import pytest
 
+from experiments.mislabelling import mislabelled
 from sgimd_torch.algorithms.paper import sagg_riac
 from sgimd_torch.asking.algorithms import SEARCHING, sgim_acts, sgim_im
-from sgimd_torch.asking.teachers import AnsweringTeacher, high_half, low_half, mislabelled
+from sgimd_torch.asking.teachers import AnsweringTeacher, high_half, low_half
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.parts import Demonstrator, Strategy
 from sgimd_torch.record import ReplayError

@@ -91,14 +91,14 @@ def test_imitations_count_for_the_teacher_and_not_as_goals_of_the_learners_own()
     assert values["teacher/missed_by"] == pytest.approx(0.3 * np.sqrt(0.5))
 
 
-def test_shares_of_regimes_sum_to_one_and_a_regime_that_was_seen_keeps_its_curve():
+def test_shares_of_kinds_of_movements_sum_to_one_and_a_kind_that_was_seen_keeps_its_curve():
     behaviour = Behaviour(0.02)
     for index, origin in enumerate(["global", "local", "local", "imitate"]):
         behaviour.episode(movement(index, GOAL, FAR, origin))
-    assert behaviour.curves().items() >= {"regime/global": 0.25, "regime/local": 0.5, "regime/imitate": 0.25}.items()
+    assert behaviour.curves().items() >= {"kind/global": 0.25, "kind/local": 0.5, "kind/imitate": 0.25}.items()
     behaviour.episode(Episode(4, np.zeros(0), None, None, None))
-    values = {tag: value for tag, value in behaviour.curves().items() if tag.startswith("regime/")}
-    assert values == {"regime/global": 0, "regime/local": 0, "regime/imitate": 0, "regime/rest": 1}
+    values = {tag: value for tag, value in behaviour.curves().items() if tag.startswith("kind/")}
+    assert values == {"kind/global": 0, "kind/local": 0, "kind/imitate": 0, "kind/rest": 1}
 
 
 def test_requests_are_counted_by_strategy():
@@ -189,9 +189,11 @@ def test_the_curves_of_a_run_are_those_of_its_record(watched):
         expected = dict(zip(read.evaluation["movements"], read.evaluation[column], strict=True))
         expected = {step: value for step, value in expected.items() if np.isfinite(value)}  # the floor: at the end only
         assert curves[f"error/{tag}"] == pytest.approx(expected, rel=1e-6)
+    shares = read.evaluation["goals_met"] / len(read.benchmark)
+    assert curves["goals/met"] == pytest.approx(dict(zip(read.evaluation["movements"], shares, strict=True)))
     first = read.origin[:50]
     for origin in np.unique(first):
-        assert curves[f"regime/{origin}"][50] == pytest.approx((first == origin).mean())
+        assert curves[f"kind/{origin}"][50] == pytest.approx((first == origin).mean())
     shown = {step: (read.demonstration[:step] >= 0).sum() for step in (50, 100, 150)}
     assert curves["teacher/demonstrations"] == shown
     assert curves["competence/R"].keys() == curves["time/physics"].keys() == {50, 100, 150}

@@ -7,8 +7,8 @@ import pytest
 
 from home_babbling import home_babbling
 from sgimd_torch import PlanarArm, random_exploration, run
-from sgimd_torch.environments.toys import toss
 from sgimd_torch.spaces import stream
+from toys import toss
 
 ARM = PlanarArm(7)
 
@@ -45,4 +45,4 @@ def test_a_seed_makes_the_same_life_and_another_seed_another():
 
 def test_contexts_are_refused():
     with pytest.raises(ValueError, match="one context only, got contexts of dim"):
-        home_babbling(toss(), 0)
+        home_babbling(toss().environment, 0)

@@ -5,8 +5,8 @@ from functools import partial
 import numpy as np
 import pytest
 
+from experiments.progress_grid import ProgressGrid
 from sgimd_torch.goals.interest_map import InterestMap
-from sgimd_torch.goals.progress_grid import ProgressGrid
 from sgimd_torch.goals.regions import absolute_progress, paired_progress
 from sgimd_torch.goals.uniform import UniformGoals
 from sgimd_torch.inverses.nearest import NearestNeighbour

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
+from experiments.progress_grid import ProgressGrid
 from sgimd_torch.goals.interest_map import InterestMap
-from sgimd_torch.goals.progress_grid import ProgressGrid
 from sgimd_torch.goals.regions import absolute_progress, gained_progress
 from sgimd_torch.spaces import Array, Box, stream
 from worlds import NO_CONTEXT, problem

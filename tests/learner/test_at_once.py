@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sgimd_torch import session
+from sgimd_torch import load_life, save_life, session
 from sgimd_torch.algorithms.practice import practice, practice_taught
 from sgimd_torch.asking.algorithms import SEARCHING, sgim_acts
 from sgimd_torch.asking.teachers import AnsweringTeacher
@@ -128,6 +128,15 @@ def asked(learner, robots):
     moves = learner.ask_many([NO_CONTEXT] * robots)
     learner.tell_many([None if move is None else ARM.execute(NO_CONTEXT, move.theta, stream(0, "n")) for move in moves])
     return moves
+
+
+def test_attempts_that_began_in_another_order_than_the_robots_are_replayed_in_theirs(tmp_path):
+    learner, again = LEARNERS["practice"](), LEARNERS["practice"]()
+    learner.request(NO_CONTEXT, place=1)  # the attempt of robot 1 begins first
+    asked(learner, 2)
+    save_life(learner, tmp_path / "life.sqlite")
+    load_life(again, tmp_path / "life.sqlite")
+    assert np.array_equal(again.memory.thetas, learner.memory.thetas)
 
 
 def test_a_robot_that_fails_ends_its_own_attempt_alone():

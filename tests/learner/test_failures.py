@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
+from experiments.toys import toss
 from runs import content_of, end, stopped_at
 from sgimd_torch.algorithms.paper import sagg_riac, sgim_d
 from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.protocol import Environment, SimulationError
-from sgimd_torch.environments.toys import toss
 from sgimd_torch.evaluation import contexts_of_goals, evaluate
 from sgimd_torch.learner.events import Kind
 from sgimd_torch.options.command_line import main
@@ -272,7 +272,7 @@ def test_three_failures_are_told_and_later_ones_only_counted(robots: Path, capsy
 
 def measured(over: float) -> Environment:
     """A toss whose every third measured wind is above C by this part of its side."""
-    robot, calls = toss(), count(1)
+    robot, calls = toss().environment, count(1)
 
     def observe(rng: np.random.Generator) -> Array:
         box = robot.contexts

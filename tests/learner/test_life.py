@@ -255,7 +255,7 @@ def test_lessons_of_different_shape_are_saved(tmp_path):
 
 @pytest.mark.parametrize(
     ("algorithm", "more"),
-    [("sgim-d", ()), ("sgim-acts", ("--teachers", "low-half,mislabelling")), ("practice", ()), ("imitation", ())],
+    [("sgim-d", ()), ("sgim-acts", ("--teachers", "low-half,high-half")), ("practice", ()), ("imitation", ())],
 )
 def test_the_file_of_a_run_is_loaded_by_a_learner_of_a_program_of_ones_own(tmp_path, algorithm, more):
     words = f"--algorithm {algorithm} --environment planar-arm-7 --evaluate_at [] --seed 4 --name run".split()

@@ -41,7 +41,7 @@ SIGNATURES = {"signature", "Signature", "getfullargspec", "parameters_of", "__co
 OPTIONS = {  # files and definitions that may read the parameters of a function; why
     ("options/signature", None): "the signature is the option",
     ("options/config", None): "options of the parts that a run has chosen",
-    ("options/catalogue", "call_checked"): "refuses what a user's own function does not take",
+    ("options/built", "call_checked"): "refuses what a user's own function does not take",
 }
 
 
@@ -128,8 +128,8 @@ class Alien:
     [
         (Halfway, "Halfway has no add, which every Goals must have"),
         (partial(Goals), "Goals has no add, sample, which every Goals must have"),
-        ("grid", "must be a class or a function, got 'grid'; import ProgressGrid"),
-        ("gird", "unknown goals 'gird'; did you mean grid?"),
+        ("uniform", "must be a class or a function, got 'uniform'; import UniformGoals"),
+        ("unifrom", "unknown goals 'unifrom'; did you mean uniform?"),
         (UniformGoals(problem()), "must be a class or a function, got a finished UniformGoals"),
         (Unasked, "Goals Unasked cannot be called with the arguments of its kind: too many positional arguments"),
         (NelderMead, "NelderMead must make a Goals, made a NelderMead; derive a class from Goals of sgimd_torch.parts"),

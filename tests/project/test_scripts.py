@@ -49,6 +49,7 @@ def go(script, options):
         (make_teachers, "--out nowhere"),
         (make_teachers, "--runs 1 --processes 1 --movements 5 --n 6"),  # too few movements
         (mutants, "nowhere"),
+        (mutants, "--commit nowhere"),
         (check_physics, "--movements 0"),
         (bench, "--rounds 0"),
         (bench, "--movements 0"),

@@ -46,7 +46,6 @@ LIBRARIES = {  # rooms or single files that may import a library, by library
     "mujoco_menagerie": {"environments/mujoco_model"},
     "torch": {"forward_model"},
     "lightning": {"forward_model"},
-    "safetensors": {"forward_model"},
     "tensorboardX": {"board"},
     "matplotlib": {"figures", "board/pictures", "views"},
     "PIL": {"views/film"},

@@ -131,7 +131,7 @@ def test_no_damage_reads_as_something_else(tmp_path, two, what):
 
 
 # Runs with rows in every table: with contexts, a model, and teachers who are asked.
-ALL = "--environment toss --algorithm sgim-acts-search --teachers all --inverse model"
+ALL = "--environment experiments.toys:toss --algorithm sgim-acts-search --teachers all --inverse model"
 SHORT = "--movements 110 --evaluate_at 60 --repeats 2 --inverse.rate 0.5 --inverse.members 2"
 
 

@@ -64,6 +64,7 @@ class Worst(Goals):
     def add(self, context, goal, competence, strategy="autonomous", gain=0.0):
         pass
 '''
+PUCK, THROW = "experiments.toys:puck", "experiments.toys:toss"
 SHORT = ("--movements", "40", "--evaluate-at", "20", "--repeats", "2", "--inverse", "linear")
 
 
@@ -123,7 +124,7 @@ def test_an_option_of_a_users_goal_model_is_its_parameter_and_nothing_else(toss,
     said = capsys.readouterr().out
     assert re.search(r"--goals.window .*\n? *number of goals .*default: 8", said), said
     assert command(main, [*words_, "--goals.window", "x"]) == 2
-    assert "--goals.window must be a whole number, got x" in capsys.readouterr().err
+    assert "--goals.window must be a whole number, got 'x'" in capsys.readouterr().err
 
 
 def test_goals_all_over_a_space_are_at_most_500_and_inside():
@@ -145,9 +146,13 @@ def test_goals_all_over_a_space_are_at_most_500_and_inside():
 
 CHANGED = [
     Config(),
-    Config("sagg-riac", evaluate_at=(5, 6), parts={"goals": "grid", "goals.progress": "absolute", "goals.window": 8}),
+    Config(
+        "sagg-riac",
+        evaluate_at=(5, 6),
+        parts={"goals": "interest-map", "goals.progress": "absolute", "goals.window": 8},
+    ),
     Config("sgim-d", parts={"environment.task_space": 2.5, "global_range": (0.1, 0.2), "goals.near": 0.1}),
-    Config("sgim-acts", name="x", teachers=("low-half", "slow"), parts={"budget": 3}),
+    Config("sgim-acts", name="x", teachers=("low-half", "high-half"), parts={"budget": 3}),
     Config("sgim-im-search", parts={"inverse": "nearest", "inverse.k": 3}),
     Config("imitation", out=Path("here"), parts={"teacher": "asked", "teacher.choose": "random"}),
 ]
@@ -180,20 +185,20 @@ def test_a_robot_that_ends_the_program_is_refused(tmp_path, module):
 
 
 def test_dashes_and_underscores_mean_the_same():
-    assert parse(["--goals", "grid", "--goals.window=8", "--give-up", "-1"]) == parse(
-        ["--goals=grid", "--goals.window", "8", "--give_up=-1"]
+    assert parse(["--goals", "interest-map", "--goals.window=8", "--give-up", "-1"]) == parse(
+        ["--goals=interest-map", "--goals.window", "8", "--give_up=-1"]
     )
 
 
 def test_help_is_one_screen_and_a_parts_options_are_shown_once_it_is_chosen(capsys):
-    for argv in (["--help"], ["--goals", "grid", "--help"]):
+    for argv in (["--help"], ["--goals", "interest-map", "--help"]):
         with pytest.raises(SystemExit) as stop:
             parse(argv, "What it does.")
         assert stop.value.code == 0
     assert len(overview(command_line.__doc__).splitlines()) <= 60
     said = capsys.readouterr().out
     assert said.count("--goals.window ") == 2  # of which one is an example
-    assert "number of recent goals that a cell remembers" in " ".join(said.split())
+    assert "number of recent competences" in " ".join(said.split())
 
 
 PARTS_OF_PRACTICE = {
@@ -217,11 +222,11 @@ def test_sagg_riac_with_every_part_of_practice_by_name_is_its_wide_family(monkey
     def with_parts(algorithm, robot, **changed):
         return lived(Config(algorithm, parts={"environment": robot, **changed}))
 
-    practice = {robot: with_parts("practice", robot) for robot in ("puck", "toss")}
+    practice = {robot: with_parts("practice", robot) for robot in (PUCK, THROW)}
     for robot in practice:
         assert np.array_equal(with_parts("sagg-riac", robot, **PARTS_OF_PRACTICE), practice[robot])
     for name in PARTS_OF_PRACTICE:
-        robot = "toss" if name == "global_range" else "puck"  # where effects are rare, competence does not decide
+        robot = THROW if name == "global_range" else PUCK  # where effects are rare, competence does not decide
         fewer = {each: value for each, value in PARTS_OF_PRACTICE.items() if each != name}
         assert not np.array_equal(with_parts("sagg-riac", robot, **fewer), practice[robot]), name
 

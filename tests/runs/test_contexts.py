@@ -15,7 +15,7 @@ from sgimd_torch.runs.tasks.taught import demonstrations_of
 
 
 def test_the_rod_in_the_wind_is_a_task():
-    config = Config("sgim-d", parts={"environment": "rod-wind", "environment.noise": 0.01})
+    config = Config("sgim-d", parts={"environment.max_wind": 0.05, "environment.noise": 0.01})
     robot = task_of(config).environment
     assert (robot.contexts.low.tolist(), robot.contexts.high.tolist()) == ([-0.05], [0.05])
     assert robot.noise == 0.01
@@ -26,13 +26,13 @@ def test_the_rod_in_the_wind_is_a_task():
 
 
 def test_the_long_rod_is_a_task_without_context():
-    robot = task_of(Config(parts={"environment": "rod-long", "environment.noise": 0.01})).environment
+    robot = task_of(Config(parts={"environment.line": 1.5, "environment.noise": 0.01})).environment
     assert (robot.noise, robot.contexts.dim) == (0.01, 0)
     assert robot.model.body("line_07").mass == pytest.approx(1.5 * FishingRod().model.body("line_07").mass)
 
 
 def test_the_rod_in_the_wind_is_run_taught_and_resumed(tmp_path, benchmark):
-    words = "--algorithm sgim-d --environment rod-wind --movements 45 --evaluate-at 35 --repeats 2"
+    words = "--algorithm sgim-d --environment.max_wind 0.05 --movements 45 --evaluate-at 35 --repeats 2"
     both = [*words.split(), "--benchmark", str(benchmark)]
     assert command(main, [*both, "--out", str(tmp_path / "whole")]) == 0
     assert command(main, [*both, "--out", str(tmp_path / "cut"), "--movements", "36"]) == 0

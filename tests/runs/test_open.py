@@ -74,7 +74,7 @@ FROM_FILE += " --environment.low -1,-1 --environment.high 1,1 --benchmark {files
 KINDS = {
     "plain": f"{ARM} --algorithm practice",
     "taught": f"{ARM} --algorithm sgim-d --teacher.every 7",
-    "asking": f"{ARM} --algorithm sgim-acts --teachers low-half,mislabelling",
+    "asking": f"{ARM} --algorithm sgim-acts --teachers low-half,high-half",
     "contexts": "--environment opened:turning --algorithm practice",
     "failures": "--environment opened:failing --algorithm sagg-riac",
     "prior": f"{ARM} --algorithm practice --begin-with {{files}}/mirrored.sqlite",

@@ -62,7 +62,13 @@ def other(tmp_path, past, how):
     path = tmp_path / "other.csv"
     match how:
         case "joints":
-            assert command(main, ["--environment", "toss", "--movements", "20", "--out", str(tmp_path / "toss")]) == 0
+            assert (
+                command(
+                    main,
+                    ["--environment", "experiments.toys:toss", "--movements", "20", "--out", str(tmp_path / "toss")],
+                )
+                == 0
+            )
             return tmp_path / "toss/practice/seed-000" / FILE, "of context, theta, outcome, this robot has"
         case "unit" | "bounds":
             path = tmp_path / FILE

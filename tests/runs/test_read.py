@@ -42,7 +42,7 @@ def test_the_arrays_of_a_run_are_the_rows_of_its_record(reference, undisturbed):
     assert run.demonstration.tolist() == shown
     assert run.benchmark.tolist() == [[0.0, 0.6], [0.3, 0.5], [-0.4, 0.4]]
     assert {name: len(column) for name, column in run.errors.items() if name != "context"} == dict.fromkeys(
-        ("movements", "answer", "goal", "error", "noise", "failed", "expected"), 3 * 3
+        ("movements", "inverse", "goal", "error", "noise", "failed", "expected"), 3 * 3
     )
     assert run.robot == "FishingRod"
     assert run.spaces["outcomes"].low.tolist() == [-1, -1]
@@ -52,7 +52,7 @@ def test_a_column_of_an_evaluation_is_found_by_its_movements(run):
     found = read_run(run)
     assert found.at(5) == found.evaluation["mean_error"][0]
     assert found.at(8, "goals_met") == found.evaluation["goals_met"][1]
-    assert np.isnan([found.at(6), found.at(5, answer="model")]).all()
+    assert np.isnan([found.at(6), found.at(5, inverse="model")]).all()
     assert found.errors["error"][found.errors["movements"] == 5][: len(found.benchmark)].mean() == found.at(5)
 
 

@@ -39,9 +39,9 @@ LEARNERS = {
     "rod": "",
     "rod, observing": "--algorithm observation",
     "arm": f"{ARM} --algorithm sagg-riac",
-    "asking": f"{ARM} --algorithm sgim-acts --teachers low-half,mislabelling",
+    "asking": f"{ARM} --algorithm sgim-acts --teachers low-half,high-half",
     "model": f"{ARM} --search gradient --inverse model --inverse.rate 0.5 --inverse.members 2 --evaluated-by own",
-    "contexts": f"{ARM} --environment toss --algorithm sgim-im --teachers all",
+    "contexts": f"{ARM} --environment experiments.toys:toss --algorithm sgim-im --teachers all",
 }
 
 

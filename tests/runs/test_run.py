@@ -32,7 +32,7 @@ def test_the_same_seed_makes_the_same_record_whatever_the_threads(tmp_path, go, 
 def answers_of(out, go, *options):
     assert go(out, *options) == 0
     (path,) = out.glob("*/seed-003")
-    return read_run(path).answers, content_of(path)["events"]
+    return read_run(path).evaluations, content_of(path)["events"]
 
 
 def test_what_a_run_learns_with_answers_once_for_both_of_its_names(tmp_path, go):

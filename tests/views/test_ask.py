@@ -49,7 +49,7 @@ def test_a_goal_is_answered_in_a_line_and_executed_if_wanted(path, lived, capsys
     estimate = lived.inverse(np.zeros(0), np.array([0.3, 0.4]))
     theta = estimate.theta
     assert [float(x) for x in said["expected"].split(",")] == pytest.approx(estimate.expected, rel=1e-3)
-    assert float(said["off"]) == pytest.approx(estimate.off, rel=1e-3)
+    assert float(said["expected_deviation"]) == pytest.approx(estimate.expected_deviation, rel=1e-3)
     assert [float(x) for x in said["theta"].split(",")] == pytest.approx(theta, abs=1e-3)
     reached = PlanarArm(7).execute(np.zeros(0), theta, np.random.default_rng(0))  # an arm without noise
     assert [float(x) for x in said["reached"].split(",")] == pytest.approx(reached, abs=1e-3)
@@ -66,7 +66,7 @@ def test_many_goals_go_in_and_out_as_tables_whose_numbers_are_exact(path, lived,
         estimate = lived.inverse(np.zeros(0), np.array([float(row["goal_0"]), float(row["goal_1"])]))
         assert [float(row[f"theta_{k}"]) for k in range(7)] == estimate.theta.tolist()
         assert [float(row[f"expected_{k}"]) for k in range(2)] == estimate.expected.tolist()
-        assert float(row["off"]) == estimate.off
+        assert float(row["expected_deviation"]) == estimate.expected_deviation
 
 
 @pytest.mark.parametrize(

@@ -44,7 +44,7 @@ def test_goals_lie_on_tiles_that_were_reached_twice_and_a_run_uses_them(own, cap
     assert "has no benchmark goals" not in capsys.readouterr().err
     judged = read_run("judged/random/seed-000")
     assert len(judged.files["benchmark_crc32"]) == 8
-    assert judged.answers["own"]["movements"].tolist() == [20, 40]
+    assert judged.evaluations["own"]["movements"].tolist() == [20, 40]
 
 
 def test_runs_are_named_one_by_one_by_variant_or_all_together(own):

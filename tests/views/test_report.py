@@ -135,13 +135,13 @@ def test_the_numbers_of_a_variant_are_interquartile_means_over_its_seeds(pages, 
 
 
 def test_a_run_that_has_hardly_begun_is_reported_and_one_that_was_never_evaluated_comes_last(run, tmp_path):
-    nothing = {name: column[:0] for name, column in run.answers["own"].items()}
+    nothing = {name: column[:0] for name, column in run.evaluations["own"].items()}
     begun = replace(
         run,
         **{name: getattr(run, name)[:0] for name in ("index", "origin", "demonstration", "contexts", "goals")},
         outcomes=run.outcomes[:0],
         demonstrations=[],
-        answers={"own": nothing},
+        evaluations={"own": nothing},
         regions=None,
         summary={**run.summary, "movements": 0, "finished": False},
     )
@@ -163,7 +163,7 @@ def test_a_run_without_evaluations_is_judged_by_its_own_goals(run, tmp_path):
         origin=np.array(["local"] * 6),
         failed=np.arange(6) == 5,
         demonstration=np.full(6, -1),
-        answers={"own": {name: column[:0] for name, column in run.answers["own"].items()}},
+        evaluations={"own": {name: column[:0] for name, column in run.evaluations["own"].items()}},
         regions=None,
         tolerance=0.02,
         summary={**run.summary, "movements": 6, "failed": 1},
@@ -215,9 +215,9 @@ def made(run, name, errors):
     """Runs like ``run`` with these last errors (m), one for each seed from 0 on."""
     runs = []
     for seed, error in enumerate(errors):
-        evaluation = {**run.answers["own"], "mean_error": np.array([0.5, error])}
+        evaluation = {**run.evaluations["own"], "mean_error": np.array([0.5, error])}
         config = {**run.config, "seed": seed}
-        runs.append(replace(run, config=config, answers={**run.answers, "own": evaluation}))
+        runs.append(replace(run, config=config, evaluations={**run.evaluations, "own": evaluation}))
     return Variant(name, runs)
 
 

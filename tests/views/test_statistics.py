@@ -10,7 +10,6 @@ from sgimd_torch.spaces import stream
 from sgimd_torch.views import statistics
 from sgimd_torch.views.statistics import (
     common_differences,
-    holm,
     improvement,
     improvement_interval,
     interquartile_mean,
@@ -102,15 +101,6 @@ def test_an_interval_of_an_improvement_holds_the_truth_at_least_about_as_often_a
     found = [improvement_interval(*pair, level=level) for pair in pairs]
     share = np.mean([each.low <= truth <= each.high for each in found])
     assert share > level - 0.1  # four standard errors at .5; five and nine at the others
-
-
-def test_holm_by_intervals_is_holm_by_p_values(rng):
-    """An interval at a level rejects where p is at most 1 - level."""
-    for p in rng.random((200, 6)) ** 4:
-        order = np.argsort(p)
-        adjusted = np.maximum.accumulate(p[order] * np.arange(6, 0, -1))
-        expected = set(order[adjusted <= 0.05].tolist())
-        assert holm(range(6), lambda claim, level, p=p: p[claim] <= 1 - level) == expected
 
 
 def test_noise_that_both_sides_of_a_pair_share_cancels(rng):

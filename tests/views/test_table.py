@@ -70,7 +70,7 @@ def test_numbers_are_interquartile_means_with_intervals_if_there_are_five_seeds_
     rows = rows_of(said.out)
     for head, column in (("error (m)", "mean_error"), ("median (m)", "median_error")):
         errors, few = (
-            np.array([read_run(path).answers["own"][column][-1] for path in sorted((runs / name).iterdir())])
+            np.array([read_run(path).evaluations["own"][column][-1] for path in sorted((runs / name).iterdir())])
             for name in ("random", "sgim-d")
         )
         middle = np.sort(errors)[1:-1].mean()  # of five seeds, the best and the worst are left out
@@ -92,8 +92,8 @@ def test_a_goal_missed_by_far_moves_the_mean_and_not_the_median(runs, monkeypatc
 
     def read(path):
         run = read_whole(path)
-        own = run.answers["own"] | {"mean_error": np.full(2, 0.41), "median_error": np.full(2, 0.05)}
-        return replace(run, answers={**run.answers, "own": own})
+        own = run.evaluations["own"] | {"mean_error": np.full(2, 0.41), "median_error": np.full(2, 0.05)}
+        return replace(run, evaluations={**run.evaluations, "own": own})
 
     monkeypatch.setattr(variants, "read_run", read)
     assert table(runs / "sgim-d", "--at", 40) == 0
@@ -121,7 +121,7 @@ def test_latex_needs_no_package_and_no_sign_of_a_name_is_a_command(copied, capsy
     assert odd.count(" & ") == 9
     assert odd.endswith(r" \\")
     ours, theirs = (
-        read_run(copied / name / "seed-000").answers["own"]["mean_error"][-1] for name in ("a_b&50%", "random")
+        read_run(copied / name / "seed-000").evaluations["own"]["mean_error"][-1] for name in ("a_b&50%", "random")
     )
     assert f"{ours - theirs:+.4f}".replace("-", "$-$") in odd
 
@@ -155,7 +155,7 @@ def test_variants_are_compared_where_all_finished_runs_were_evaluated_the_last_t
     said = capsys.readouterr()
     assert rows_of(said.out)["random"]["movements"] == "20"
     assert len(said.out.splitlines()) == 4
-    error = read_run(copied / "longer/seed-000").answers["own"]["mean_error"][0]
+    error = read_run(copied / "longer/seed-000").evaluations["own"]["mean_error"][0]
     assert f"{error:.3f}" in next(line for line in said.out.splitlines() if line.startswith("longer"))
 
 
@@ -166,9 +166,9 @@ def test_an_unfinished_run_counts_where_it_was_evaluated_and_is_named_where_it_w
         run = read_whole(path)
         if path != cut:
             return run
-        own = {name: column[:1] for name, column in run.answers["own"].items()}
+        own = {name: column[:1] for name, column in run.evaluations["own"].items()}
         summary = {**run.summary, "finished": False}
-        return replace(run, index=run.index[:30], answers={**run.answers, "own": own}, summary=summary)
+        return replace(run, index=run.index[:30], evaluations={**run.evaluations, "own": own}, summary=summary)
 
     monkeypatch.setattr(variants, "read_run", read)
     for at, seeds in ((), "4"), (("--at", 20), "5"):
@@ -234,7 +234,7 @@ def test_few_seeds_are_compared_with_the_baseline_by_their_differences_alone(run
     assert table(runs, "--at", 40, "--baseline", "random") == 0
     head, found = last_column(capsys.readouterr().out)
     ours, theirs = (
-        read_run(runs / name / "seed-000").answers["own"]["mean_error"][-1] for name in ("sgim-d", "random")
+        read_run(runs / name / "seed-000").evaluations["own"]["mean_error"][-1] for name in ("sgim-d", "random")
     )
     assert head == "minus random (m)"
     assert found == {"random": "-", "sgim-d": f"{ours - theirs:+.4f}"}  # of the only seed that both have

@@ -1,4 +1,4 @@
-"""Arms and a swimmer as tasks. Benchmark goals and demonstrations do not depend on the seed of a run."""
+"""Planar arms as tasks. Benchmark goals and demonstrations do not depend on the seed of a run."""
 
 from __future__ import annotations
 
@@ -8,14 +8,12 @@ from typing import Final
 import numpy as np
 
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.evaluation import SHIPPED as SHIPPED_BENCHMARK
 from sgimd_torch.evaluation import Benchmark, tile_goals
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.spaces import Array, Box, Demonstration, stream
 
-DATA: Final = SHIPPED_BENCHMARK.parent
 SIDE: Final = 0.1  # m, side of a benchmark tile; the disc of radius 1 m that an arm reaches has 311 goals
-SHOWN: Final = 127  # number of demonstrations, equal to that of the rod's demonstrators
+N_DEMONSTRATIONS: Final = 127  # number of demonstrations, equal to that of the rod's demonstrators
 SAMPLES: Final = 5  # number of samples in the trajectory of an arm's demonstration
 
 
@@ -31,19 +29,6 @@ planar_arm_50 = partial(planar_arm, n_joints=50)
 """Planar arm with 50 joints, no noise."""
 
 
-def swimmer() -> Task:
-    """gymnasium's Swimmer-v5: three links and two motors; a demonstration is a sequence of torques."""
-    from sgimd_torch.environments.swimmer import Swimmer  # gymnasium is loaded only when it is needed
-
-    return Task(Swimmer(), DATA / "swimmer_benchmark.npz", DATA / "swimmer_demonstrations.npz")
-
-
-def half_reached() -> Task:
-    """Planar arm with 7 joints that reaches less than half of T."""
-    arm = PlanarArm(7, noise=0.02, outcomes=Box(np.array([-1.0, -1.0]), np.array([3.0, 1.0]), ("x", "y"), "m"))
-    return Task(arm, partial(arm_benchmark, arm))
-
-
 def arm_benchmark(arm: PlanarArm) -> Benchmark:
     """One random goal in each tile of T, if the arm can reach this goal; every run has the same goals."""
     box = arm.outcomes
@@ -53,8 +38,10 @@ def arm_benchmark(arm: PlanarArm) -> Benchmark:
 
 def arm_demonstrations(arm: PlanarArm) -> list[Demonstration]:
     """Movements from rest to outcomes spread evenly over the reachable disc; all joints but the first bend equally."""
-    shares = (np.arange(SHOWN) + 0.5) / SHOWN  # shares of the disc's area, which make a sunflower spiral
-    turns = np.pi * (3 - np.sqrt(5)) * np.arange(SHOWN)
+    shares = (
+        np.arange(N_DEMONSTRATIONS) + 0.5
+    ) / N_DEMONSTRATIONS  # shares of the disc's area, which make a sunflower spiral
+    turns = np.pi * (3 - np.sqrt(5)) * np.arange(N_DEMONSTRATIONS)
     ends = np.sqrt(shares)[:, None] * np.stack([np.cos(turns), np.sin(turns)], axis=1)
     return [_led_to(arm, end) for end in ends]
 

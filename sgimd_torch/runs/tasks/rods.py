@@ -47,14 +47,6 @@ def fishing_rod(*, task_space: float = 1.0, threads: int = 1, **physics: Any) ->
     )
 
 
-rod_wind = partial(fishing_rod, max_wind=0.05)
-"""Rod in a side wind of up to a quarter of the float's weight; the wind is the context."""
-rod_yaw = partial(fishing_rod, max_yaw=0.5)
-"""Rod with its base turned by up to half a radian; the angle is the context."""
-rod_long = partial(fishing_rod, line=1.5)
-"""Rod with a line 1.5 times as long as in its demonstrations."""
-
-
 def _in_context_zero(context_dim: int) -> list[Demonstration]:
     """The shipped demonstrations, as demonstrations in the context 0 of a rod with contexts."""
     return [replace(shown, context=np.zeros(context_dim)) for shown in load_demonstrations()]

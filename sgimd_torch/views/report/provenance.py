@@ -12,7 +12,7 @@ from typing import Final
 from sgimd_torch.runs.read import Run
 from sgimd_torch.runs.signals import printable
 from sgimd_torch.views.statistics import LEAST_SEEDS
-from sgimd_torch.views.variants import Variant, differing, shown
+from sgimd_torch.views.variants import Variant, differing, text_of
 
 AGAIN: Final = "runs/again"  # folder for the repeated runs
 
@@ -51,7 +51,7 @@ def versions(variants: Sequence[Variant]) -> dict[str, dict[str, None]]:
         for made_by in (run.versions, *run.versions.get("before", ())):
             for name, value in made_by.items():
                 if name != "before":
-                    found.setdefault(name, {})[shown(value)] = None
+                    found.setdefault(name, {})[text_of(value)] = None
     return found
 
 

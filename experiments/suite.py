@@ -6,13 +6,14 @@ compares several learners. Each task has a table like that of sgimd table, in th
 the error minus the error of random movements. The defaults of this library were chosen on half of the tasks; the other
 tasks are marked "new".
 
-  sgimd suite                                             the default learner on the tasks without physics
-  sgimd suite --seeds 0-9 --movements 2000 --out study    runs go to study/TASK/NAME/seed-000
-  sgimd suite --vary inverse=linear,process --seeds 0-4   compare two inverse models
-  sgimd suite --tasks all                                 also fishing rod and swimmer (extra gym); a run takes minutes
-  sgimd suite --tasks toss crawler --algorithm sagg-riac --budget 4
+  python experiments/suite.py                                             the default learner, tasks without physics
+  python experiments/suite.py --seeds 0-9 --movements 2000 --out study    runs go to study/TASK/NAME/seed-000
+  python experiments/suite.py --vary inverse=linear,process --seeds 0-4   compare two inverse models
+  python experiments/suite.py --tasks all                                 also rod and swimmer; a run takes minutes
+  python experiments/suite.py --tasks toss crawler --algorithm sagg-riac --budget 4
 
-Repeat the command after Ctrl-C or a power cut, or with more seeds: finished runs are kept.
+Start it in the root folder of the repository. Repeat the command after Ctrl-C or a power cut, or with more seeds:
+finished runs are kept.
 
 Exit code: 0 all runs are finished, 1 some failed, 2 the request is wrong, 130 or 143 stopped by Ctrl-C or SIGTERM.
 """
@@ -20,19 +21,20 @@ Exit code: 0 all runs are finished, 1 some failed, 2 the request is wrong, 130 o
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from sgimd_torch.options.catalogue import ROD
 from sgimd_torch.options.config import Config
 from sgimd_torch.runs.read import finished
-from sgimd_torch.runs.signals import parser_of
+from sgimd_torch.runs.signals import command
 from sgimd_torch.runs.sweep import add_options, add_vary, run_all, variants_of
 
 
 @dataclass(frozen=True)
-class Suited:
+class SuiteTask:
     """A task of the suite.
 
     Args:
@@ -41,24 +43,24 @@ class Suited:
         quick: whether the task needs no physics simulation.
     """
 
-    options: Mapping[str, Any] = field(default_factory=dict)
+    options: Mapping[str, Any]
     new: bool = False
     quick: bool = True
 
 
-TASKS: Final[dict[str, Suited]] = {
-    "rod": Suited({"environment": ROD}, quick=False),
-    "planar-arm-50": Suited({"environment": "planar-arm-50"}),
-    "toss": Suited({"environment": "toss"}),
-    "two-elbows": Suited({"environment": "two-elbows"}),
-    "half-reached": Suited({"environment": "half-reached"}),
-    "rod-large": Suited({"environment": ROD, "environment.task_space": 100.0}, new=True, quick=False),
-    "swimmer": Suited({"environment": "swimmer"}, new=True, quick=False),
-    "planar-arm-7": Suited({"environment": "planar-arm-7"}, new=True),
-    "crawler": Suited({"environment": "crawler"}, new=True),
-    "spatial-arm": Suited({"environment": "spatial-arm"}, new=True),
-    "puck": Suited({"environment": "puck"}),
-    "fetch": Suited({"environment": "fetch"}, new=True),
+TASKS: Final[dict[str, SuiteTask]] = {
+    "rod": SuiteTask({"environment": ROD}, quick=False),
+    "planar-arm-50": SuiteTask({"environment": "planar-arm-50"}),
+    "toss": SuiteTask({"environment": "experiments.toys:toss"}),
+    "two-elbows": SuiteTask({"environment": "experiments.toys:two_elbows"}),
+    "half-reached": SuiteTask({"environment": "experiments.toys:half_reached"}),
+    "rod-large": SuiteTask({"environment": ROD, "environment.task_space": 100.0}, new=True, quick=False),
+    "swimmer": SuiteTask({"environment": "experiments.swimmer:swimmer"}, new=True, quick=False),
+    "planar-arm-7": SuiteTask({"environment": "planar-arm-7"}, new=True),
+    "crawler": SuiteTask({"environment": "experiments.toys:crawler"}, new=True),
+    "spatial-arm": SuiteTask({"environment": "experiments.toys:spatial_arm"}, new=True),
+    "puck": SuiteTask({"environment": "experiments.toys:puck"}),
+    "fetch": SuiteTask({"environment": "experiments.toys:fetch"}, new=True),
 }
 RANDOM, UNIFORM = "random-nearest", "uniform-nearest"
 REFERENCES: Final[dict[str, dict[str, Any]]] = {
@@ -71,26 +73,21 @@ REFERENCES: Final[dict[str, dict[str, Any]]] = {
         "budget": 1,
     },
 }
-DEFAULTS: Final = {
-    "algorithm": "practice",
-    "movements": "1000",
-    "repeats": "0",
-    "out": "runs/suite",
-}
-OWN: Final = ("environment", "benchmark", "demonstrations", "name")  # options that a task decides
+DEFAULTS: Final = {"algorithm": "practice", "movements": "1000", "repeats": "0", "out": "runs/suite"}
+OF_THE_TASK: Final = ("environment", "benchmark", "demonstrations", "name")  # options that a task decides
 SHARED: Final = ("movements", "evaluate_at", "evaluated_by", "repeats", "floor_at", "out")  # common to all runs
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Carry out unfinished runs, print a table for each task, and return the exit code: 1 if runs failed, else 0."""
-    options, rest = _options(argv)
+    options, rest = parsed_options(argv)
     configs, flags = runs_of(options, rest)
     code = run_all(configs, options, flags, configs[0].out.parent)
     from sgimd_torch.views import table  # scipy's statistics are slow to import
 
-    for place in [] if options.dry_run else dict.fromkeys(config.out for config in configs if finished(config)):
-        print(f"\n{titled(place.name)}")
-        table.main([str(place), "--baseline", RANDOM])
+    for folder in [] if options.dry_run else dict.fromkeys(config.out for config in configs if finished(config)):
+        print(f"\n{titled(folder.name)}")
+        table.main([str(folder), "--baseline", RANDOM])
     return code
 
 
@@ -105,24 +102,24 @@ def runs_of(options: argparse.Namespace, rest: Sequence[str]) -> tuple[list[Conf
         ValueError: an option is decided by each task, or cannot be varied.
     """
     given = {word.partition("=")[0].lstrip("-").replace("_", "-") for word in [*rest, *options.vary]}
-    for name in OWN:
+    for name in OF_THE_TASK:
         if name in {word.partition(".")[0] for word in given}:
             raise ValueError(f"--{name} cannot be given here: each task has its own; choose tasks with --tasks")
     words = [*(f"--{name}={value}" for name, value in DEFAULTS.items() if name not in given), *rest]
     learners, flags = variants_of(options.vary, words)
     shared = {name: learners[0][name] for name in SHARED}
-    others = [Config.from_settings({"name": name, **line, **shared}) for name, line in REFERENCES.items()]
+    references = [Config.from_settings({"name": name, **line, **shared}) for name, line in REFERENCES.items()]
     configs = [
         replace(
-            each,
+            config,
             seed=seed,
-            name=each.variant,
-            out=each.out / task,
-            parts={**dict(each.parts), **TASKS[task].options},
+            name=config.variant,
+            out=config.out / task,
+            parts={**dict(config.parts), **TASKS[task].options},
         )
         for seed in options.seeds
         for task in options.tasks
-        for each in [*others, *learners]
+        for config in [*references, *learners]
     ]
     return configs, flags
 
@@ -132,10 +129,15 @@ def titled(task: str) -> str:
     return task + " (new)" * TASKS[task].new
 
 
-def parser() -> argparse.ArgumentParser:
-    """The options of ``sgimd suite``."""
-    usage = "%(prog)s [--tasks TASK ...] [--vary OPTION=VALUE,VALUE ...] [--seeds SEEDS] [--OPTION VALUE ...]"
-    parser = parser_of("suite", __doc__, usage=usage, epilog=f"tasks: {', '.join(map(titled, TASKS))}")
+def parsed_options(argv: Sequence[str] | None) -> tuple[argparse.Namespace, list[str]]:
+    """The options of the suite, and the options of ``sgimd run``."""
+    parser = argparse.ArgumentParser(
+        prog="python experiments/suite.py",
+        usage="%(prog)s [--tasks TASK ...] [--vary OPTION=VALUE,VALUE ...] [--seeds SEEDS] [--OPTION VALUE ...]",
+        description=__doc__,
+        epilog=f"tasks: {', '.join(map(titled, TASKS))}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     parser.add_argument(
         "--tasks",
         nargs="+",
@@ -146,11 +148,11 @@ def parser() -> argparse.ArgumentParser:
     )
     add_vary(parser)
     add_options(parser, seeds="0")
-    return parser
-
-
-def _options(argv: Sequence[str] | None) -> tuple[argparse.Namespace, list[str]]:
-    options, rest = parser().parse_known_args(argv)
-    chosen = {"quick": [name for name, task in TASKS.items() if task.quick], "all": list(TASKS)}
-    options.tasks = list(dict.fromkeys(name for word in options.tasks for name in chosen.get(word, [word])))
+    options, rest = parser.parse_known_args(argv)
+    groups = {"quick": [name for name, task in TASKS.items() if task.quick], "all": list(TASKS)}
+    options.tasks = list(dict.fromkeys(name for word in options.tasks for name in groups.get(word, [word])))
     return options, rest
+
+
+if __name__ == "__main__":
+    sys.exit(command(main))

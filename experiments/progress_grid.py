@@ -2,13 +2,14 @@
 
 All else follows section 3.2 of Nguyen & Oudeyer (2014). A grid may be as good as the map if there are few dimensions
 and all of the task space can be reached.
-    goals = ProgressGrid(problem)
+    sgimd run --goals experiments.progress_grid:ProgressGrid          # in the root folder of the repository
 """
 
 from __future__ import annotations
 
 import itertools
 from functools import partial
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,8 +19,8 @@ from sgimd_torch.goals.tiling import Tiling
 from sgimd_torch.parts import Goals, Problem
 from sgimd_torch.spaces import Array
 
-_DEFAULT_CELLS = 100  # number of cells; each needs four goals before its progress is known; a run has about 500 goals
-_MAX_CELLS = 100_000  # largest number of cells, more than any run has goals
+DEFAULT_CELLS: Final = 100  # number of cells; each needs four goals before its progress is known
+MAX_CELLS: Final = 100_000  # largest number of cells, more than any run has goals
 
 
 class ProgressGrid(Goals):
@@ -51,10 +52,10 @@ class ProgressGrid(Goals):
             raise ValueError(f"window must be even and at least 4, got {window}")
         dim = problem.contexts.dim + problem.outcomes.dim
         if cells is None:
-            cells = max(2, round(_DEFAULT_CELLS ** (1 / dim)))
-        if cells < 1 or cells**dim > _MAX_CELLS:
+            cells = max(2, round(DEFAULT_CELLS ** (1 / dim)))
+        if cells < 1 or cells**dim > MAX_CELLS:
             raise ValueError(
-                f"cells must be at least 1 for each dimension and at most {_MAX_CELLS} in all, "
+                f"cells must be at least 1 for each dimension and at most {MAX_CELLS} in all, "
                 f"got {cells} in {dim} dimensions"
             )
         self.window = window
