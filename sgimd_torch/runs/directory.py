@@ -20,11 +20,10 @@ from sgimd_torch.environments.protocol import Environment, FromFiles
 from sgimd_torch.files import checksum, make_folder
 from sgimd_torch.options.build import RunParts
 from sgimd_torch.options.catalogue import PLACES, WORDS, function_of
-from sgimd_torch.options.config import Config, differ, words
+from sgimd_torch.options.config import FILES, Config, differ, words
 from sgimd_torch.record import Dims, Record, RunError
 
 FILE: Final = "run.sqlite"
-FILES: Final = ("benchmark", "demonstrations", "begin_with")  # options that name a file
 THREADS: Final = "environment.threads"
 PLACE: Final = ("seed", "out", "name", "board", THREADS)  # seed, place, display and speed of a run
 EVALUATES: Final = ("evaluated_by", "repeats", "floor_at", "benchmark_crc32")  # equal options of all evaluations

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from sgimd_torch.evaluation import OwnGoals
 from sgimd_torch.files import checksum
 from sgimd_torch.learner.events import Kind
-from sgimd_torch.options.config import OWN, Config, differ
+from sgimd_torch.options.config import FILES, OWN, Config, differ
 from sgimd_torch.record import DERIVED, Record, RunError, layout
-from sgimd_torch.runs.directory import FILE, FILES, PLACE, code_of, with_found_earlier
+from sgimd_torch.runs.directory import FILE, PLACE, code_of, with_found_earlier
 from sgimd_torch.spaces import Array, Box, Demonstration
 
 Columns = dict[str, np.ndarray]
