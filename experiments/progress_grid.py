@@ -14,8 +14,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.goals.regions import Progress, Region, gained_progress, interest_of
-from sgimd_torch.goals.tiling import Tiling
+from sgimd_torch.goals.regions import Progress, Region, Tiling, gained_progress, interest_of
 from sgimd_torch.parts import Goals, Problem
 from sgimd_torch.spaces import Array
 

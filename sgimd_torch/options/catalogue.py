@@ -59,7 +59,6 @@ WORDS: Final[dict[str, dict[str, str]]] = {
     "progress": {
         "gained": "goals.regions:gained_progress",
         "absolute": "goals.regions:absolute_progress",
-        "paired": "goals.regions:paired_progress",
     },
     "search": {
         "nelder-mead": "searches.simplex:NelderMead",

@@ -1,13 +1,11 @@
-"""Every goal model keeps the same promises; and what the interest map's rivals without a tree do with progress."""
-
-from functools import partial
+"""Every goal model keeps the same promises; uniform goals, and the grid of the experiments."""
 
 import numpy as np
 import pytest
 
 from experiments.progress_grid import ProgressGrid
 from sgimd_torch.goals.interest_map import InterestMap
-from sgimd_torch.goals.regions import absolute_progress, paired_progress
+from sgimd_torch.goals.regions import absolute_progress
 from sgimd_torch.goals.uniform import UniformGoals
 from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.options.catalogue import WORDS
@@ -16,16 +14,11 @@ from worlds import NO_CONTEXT, part, problem, remember
 
 LINE, SQUARE = Box.cube(0, 1, 1), Box.cube(0, 1, 2)
 
-PAIRED = {
-    "paired": partial(InterestMap, window=20, progress=paired_progress),
-    "paired grid": partial(ProgressGrid, cells=3, progress=paired_progress),
-}
 
-
-@pytest.fixture(params=[*WORDS["goals"], *PAIRED])
+@pytest.fixture(params=[*WORDS["goals"], "experiments.progress_grid:ProgressGrid"])
 def make(request):
     """Every goal model."""
-    return PAIRED.get(request.param) or part("goals", request.param)
+    return part("goals", request.param)
 
 
 def in_a_context(seed):
