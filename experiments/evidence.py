@@ -16,12 +16,13 @@ from typing import Final
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
+from scipy import optimize, stats
 
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.statistics import (
+    LEAST_SEEDS,
     LEVEL,
     Interval,
-    improvement_interval,
     interquartile_mean,
     interval,
     point,
@@ -265,3 +266,44 @@ def _two_or_more(found: pd.Series, what: str) -> pd.Series:
     if len(found) < 2:
         raise NotRun(what)
     return found
+
+
+def improvement(ours: Array, theirs: Array) -> Array:
+    """Probability of improvement: share of the pairs (one of our errors, one of theirs) in which ours is smaller.
+
+    The errors are ``(..., n)`` and ``(..., m)``; a tie counts half. The share is the Mann-Whitney statistic divided by
+    n m; see Agarwal et al. (2021).
+    """
+    x, y = np.asarray(ours)[..., :, None], np.asarray(theirs)[..., None, :]
+    shares: Array = np.mean((x < y) + 0.5 * (x == y), axis=(-2, -1))
+    return shares
+
+
+def improvement_interval(ours: Array, theirs: Array, *, level: float = LEVEL) -> Interval:
+    """``improvement`` of ours ``(n,)`` over theirs ``(m,)``, with a score interval, which stays wide for few seeds.
+
+    Wilson's interval for this statistic has all probabilities that the data do not reject (Newcombe 2006, Statistics in
+    Medicine 25:559, method 5). If all our errors are smaller than all of theirs, the interval is [.80, 1] with 10 seeds
+    and [.90, 1] with 20; a bootstrap would give [1, 1] even with 2 seeds. If errors are normal, the interval has the
+    true value in 95 to 98 % of cases with 5, 10 or 20 seeds. With fewer than ``LEAST_SEEDS``, the result is a `point`.
+
+    Raises:
+        ValueError: a side has fewer than 2 seeds, or an error is not finite.
+    """
+    for sample in (ours, theirs):
+        if len(sample) < 2 or not np.isfinite(sample).all():
+            raise ValueError(f"an interval needs 2 or more seeds with finite errors, got {np.asarray(sample).tolist()}")
+    n, m, found = len(ours), len(theirs), float(improvement(ours, theirs))
+    if min(n, m) < LEAST_SEEDS:
+        return point(found)
+    z = float(stats.norm.isf((1 - level) / 2))
+
+    def excess(p: float) -> float:
+        """Squared distance from p to the statistic, minus z^2 times the variance under p; above 0, p is rejected."""
+        variance = p * (1 - p) * (1 + ((n + m) / 2 - 1) * ((1 - p) / (2 - p) + p / (1 + p))) / (n * m)
+        return (found - p) ** 2 - z * z * variance
+
+    inside = float(np.clip(found, 1e-9, 1 - 1e-9))
+    low = optimize.brentq(excess, 0.0, inside) if found > 0 else 0.0
+    high = optimize.brentq(excess, inside, 1.0) if found < 1 else 1.0
+    return Interval(found, low, high)

@@ -5,10 +5,9 @@ if all pass, it survives, and a test is missing. Each mutant is tried with the t
 the tests marked slow; at the end, the tests that failed are carried out without a mutant. The working tree does not
 change. All mutants take about 10 minutes of processor time.
 
-    python scripts/mutants.py                        # all mutants
+    python scripts/mutants.py                        # all mutants; with --list, only their numbers and names
     python scripts/mutants.py 7 12 simplex           # numbers 7 and 12, and all whose names contain "simplex"
     python scripts/mutants.py --commit HEAD~3        # the code of a commit, in place of the working tree
-    python scripts/mutants.py --list                 # numbers, names and places; nothing runs
 """
 
 from __future__ import annotations
@@ -99,6 +98,10 @@ requests: costs do not count | asking/interest.py | asking/test_interest.py
     - np.log(cost) ==> - 0 * np.log(cost)
 record: the outcome in the columns of the goal | record/layout.py | record/test_record.py
     *_cells(event.goal, t), ==> *_cells(event.outcome, t),
+record: NaN is kept as a number | record/layout.py | record/test_record.py
+    (None if value != value else ==> (value if value != value else
+record: the last rows come first | record/__init__.py | record/test_record.py
+    ORDER BY rowid LIMIT ==> ORDER BY -rowid LIMIT
 replay: another theta is accepted | record/replay.py | learner/test_life.py
     if not box.same(recorded, now): ==> if now is recorded:
 replay: another demonstration is accepted | record/replay.py | learner/test_life.py

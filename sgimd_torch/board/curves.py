@@ -67,15 +67,15 @@ class Behaviour:
         return values
 
 
-def of_evaluation(found: Evaluation, near: float) -> dict[str, float]:
+def of_evaluation(evaluation: Evaluation, near: float) -> dict[str, float]:
     """Values of the curves of an evaluation by tag; a goal with an error of at most ``near`` counts as met."""
     return {
-        "error/mean": found.mean_error,
-        "error/median": float(np.median(found.errors)),
-        "error/p90": float(np.quantile(found.errors, 0.9)),
-        "error/noise_floor": found.noise_floor,
-        **({"error/failed": float(found.failed.sum())} if found.failed.any() else {}),
-        "goals/met": float((found.errors <= near).mean()),
+        "error/mean": evaluation.mean_error,
+        "error/median": float(np.median(evaluation.errors)),
+        "error/p90": float(np.quantile(evaluation.errors, 0.9)),
+        "error/noise_floor": evaluation.noise_floor,
+        **({"error/failed": float(evaluation.failed.sum())} if evaluation.failed.any() else {}),
+        "goals/met": float((evaluation.errors <= near).mean()),
     }
 
 
@@ -98,9 +98,9 @@ def branches(regions: Sequence[Region]) -> Mapping[str, list[Region]]:
 
     Cells that never split, such as "R.3.7", form no tree: "R" is their only node.
     """
-    found: dict[str, list[Region]] = {}
+    leaves_below: dict[str, list[Region]] = {}
     for region in regions:
         path = region.path.partition(".")[0]
         for length in range(1, min(len(path), DEPTH + 1) + 1):
-            found.setdefault(path[:length], []).append(region)
-    return dict(sorted(found.items()))
+            leaves_below.setdefault(path[:length], []).append(region)
+    return dict(sorted(leaves_below.items()))

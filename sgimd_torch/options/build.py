@@ -5,7 +5,7 @@ parts = build(Config(seed=3)); for episode in run(parts.learner, parts.environme
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -15,12 +15,12 @@ from sgimd_torch.environments.protocol import Environment, FromFiles
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.files import checksum
 from sgimd_torch.learner import Learner
-from sgimd_torch.options.catalogue import call_checked, function_of, load_word
-from sgimd_torch.options.config import ALGORITHM, OWN, Config
+from sgimd_torch.options.built import call_checked
+from sgimd_torch.options.catalogue import load_word
+from sgimd_torch.options.config import OWN, Config
 from sgimd_torch.parts import Demonstrator, Inverse, Teacher
 from sgimd_torch.runs.at_once import check_at_once
 from sgimd_torch.runs.tasks import Task, benchmark_of
-from sgimd_torch.spaces import Demonstration, stream
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,43 +69,27 @@ def build(config: Config) -> RunParts:
     config = with_found(config, task.environment)
     check_at_once(task.environment, config.at_once)
     benchmark, notes, benchmark_crc32 = benchmark_of(task, config.benchmark)
-    shown: dict[str, Any] = {}
-    teacher: Teacher | None = None
-    teachers: dict[str, Demonstrator] = {}
-    demonstrations_crc32 = None
+    teacher, teachers, demonstrations_crc32 = None, dict[str, Demonstrator](), None
+    given: dict[str, Any] = {}  # arguments of the algorithm that not every algorithm has
     if config.teaching:
-        from sgimd_torch.runs.tasks.taught import correspondence_of, demonstrations_of  # not for learners alone
+        from sgimd_torch.runs.tasks.taught import correspondence_of, teachers_of  # not for learners alone
 
-        asked = (config.teachers or ("all",)) if config.teaching == "teachers" else ()
-        makers = {word: load_word("teachers", word) for word in asked}
-        own = [config.constructor("teacher")] if "teacher" in config else []
-        demonstrations: Sequence[Demonstration] = []
-        if any(map(_needs_demonstrations, (*makers.values(), *own))):
-            demonstrations, about_them, demonstrations_crc32 = demonstrations_of(task, config.demonstrations)
-            notes += about_them
-        shown["correspondence"] = correspondence_of(task)
-        for make in own:
-            teacher = Teacher.of(make, demonstrations, stream(config.seed, "teacher"))
-        for word, make in makers.items():
-            teachers[word] = Demonstrator.of(make, demonstrations, stream(config.seed, f"teacher {word}"))
-        if teachers:
-            shown["teachers"] = teachers
-    begin_with_crc32 = None
+        teacher, teachers, demonstrations_crc32 = teachers_of(config, task, notes)
+        given = {"correspondence": correspondence_of(task), **({"teachers": teachers} if teachers else {})}
     if config.begin_with is not None:
         from sgimd_torch.runs.past import past_of  # few runs begin with a past
 
-        shown["prior"] = past_of(config.begin_with, task.environment)
-        notes = [*notes, f"begins with {len(shown['prior'])} movements of {config.begin_with}, as far as they help"]
-        begin_with_crc32 = checksum(config.begin_with)
+        given["prior"] = past_of(config.begin_with, task.environment)
+        notes.append(f"begins with {len(given['prior'])} movements of {config.begin_with}, as far as they help")
     algorithm = f"algorithm {config.algorithm}"
-    learner = call_checked(algorithm, config.constructor(ALGORITHM), task.environment, config.seed, **shown)
+    learner = call_checked(algorithm, config.constructor("algorithm"), task.environment, config.seed, **given)
     if not isinstance(learner, Learner):
         raise ValueError(f"{algorithm} must return a Learner, got a {type(learner).__name__}")
     if config.until is not None and not learner.inverse.says_how_sure:
         name = type(learner.inverse).__name__
         raise ValueError(f"--until needs an inverse model that says how sure it is, such as process; {name} does not")
-    _inverses(config, learner)  # made now, so that their remarks are among the notes
-    check_watcher(learner)  # an answer may have a forward model
+    _inverses(config, learner)  # made here, so that their remarks are among the notes
+    check_watcher(learner)  # an inverse model of the evaluations may have a forward model
     return RunParts(
         config=config,
         task=task,
@@ -116,7 +100,7 @@ def build(config: Config) -> RunParts:
         data={
             "demonstrations_crc32": demonstrations_crc32,
             "benchmark_crc32": benchmark_crc32,
-            "begin_with_crc32": begin_with_crc32,
+            "begin_with_crc32": checksum(config.begin_with) if config.begin_with else None,
         },
         notes=[*notes, *learner.problem.remarks],
     )
@@ -132,23 +116,17 @@ def task_of(config: Config) -> Task:
     return task if isinstance(task, Task) else Task(task)
 
 
+def with_found(config: Config, robot: Environment) -> Config:
+    """The settings, with the options that the robot found by movements, such as the corners of T."""
+    values = robot.found if isinstance(robot, FromFiles) else {}
+    options = {f"environment.{name}": value for name, value in values.items() if f"environment.{name}" in config}
+    return replace(config, parts={**dict(config.parts), **options})
+
+
 def _inverses(config: Config, learner: Learner) -> dict[str, Inverse]:
-    problem, found = learner.problem, {OWN: learner.inverse}
+    problem, inverses = learner.problem, {OWN: learner.inverse}
     for word in config.evaluated_by[1:]:
         make = partial(Inverse.of, load_word("inverse", word), problem)
         learnt_with = config.values.get("inverse") == word
-        found[word] = learner.inverse if learnt_with else problem.shared(f"answer {word}", make)
-    return found
-
-
-def with_found(config: Config, robot: Environment) -> Config:
-    """The settings, with the options that the robot found by movements, such as the corners of T."""
-    found = {
-        f"environment.{name}": value for name, value in (robot.found if isinstance(robot, FromFiles) else {}).items()
-    }
-    return replace(config, parts={**dict(config.parts), **{name: found[name] for name in found if name in config}})
-
-
-def _needs_demonstrations(make: Callable[..., Any]) -> bool:
-    kind = function_of(make)
-    return not (isinstance(kind, type) and issubclass(kind, Teacher)) or kind.needs_demonstrations
+        inverses[word] = learner.inverse if learnt_with else problem.shared(f"answer {word}", make)
+    return inverses

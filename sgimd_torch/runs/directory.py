@@ -12,6 +12,7 @@ import os
 import platform
 import shutil
 import subprocess
+from collections.abc import Mapping
 from itertools import count
 from pathlib import Path
 from typing import Any, Final
@@ -20,11 +21,21 @@ import sgimd_torch
 from sgimd_torch.environments.protocol import Environment, FromFiles
 from sgimd_torch.files import checksum, make_folder
 from sgimd_torch.options.build import RunParts
-from sgimd_torch.options.catalogue import function_of
-from sgimd_torch.options.config import EVALUATES, MAY_CHANGE, PLACE, Config, code_of, differ, words
+from sgimd_torch.options.catalogue import PLACES, WORDS, function_of
+from sgimd_torch.options.config import Config, differ, words
 from sgimd_torch.record import Dims, Record, RunError
 
 FILE: Final = "run.sqlite"
+FILES: Final = ("benchmark", "demonstrations", "begin_with")  # options that name a file
+THREADS: Final = "environment.threads"
+PLACE: Final = ("seed", "out", "name", "board", THREADS)  # seed, place, display and speed of a run
+EVALUATES: Final = ("evaluated_by", "repeats", "floor_at", "benchmark_crc32")  # equal options of all evaluations
+MAY_CHANGE: Final = (
+    *("movements", "until", "out", "name", "board", "failures", "evaluate_at"),
+    *(*FILES, *EVALUATES, THREADS),
+)
+"""Options that may change when a run is resumed, as they do not affect the learner. Files are compared by their
+checksums: the demonstrations must be equal, the benchmark may be another one."""
 LONGEST: Final = 504  # bytes, longest path of a file that SQLite opens
 LIBRARIES: Final = ("numpy", "scipy", "faiss-cpu", "mujoco")
 FORWARD: Final = ("torch", "lightning")  # libraries of a forward model
@@ -207,6 +218,13 @@ def sources(config: Config, robot: Environment) -> dict[str, str]:
         if spec is not None and spec.has_location and spec.origin:
             found[f"source of {word}"] = f"{Path(spec.origin).name}, crc32 {checksum(Path(spec.origin))}"
     return found
+
+
+def code_of(settings: Mapping[str, Any]) -> list[str]:
+    """Places ``package.module:attribute`` in ``settings`` that are a user's own code."""
+    named = [value for name, value in settings.items() if name.rpartition(".")[2] in (*WORDS, "evaluated_by")]
+    words = [word for value in named for word in (value if isinstance(value, list) else [value])]
+    return sorted({word for word in words if isinstance(word, str) and ":" in word and word not in PLACES})
 
 
 def versions(*, forward: bool) -> dict[str, Any]:

@@ -34,10 +34,10 @@ def past_of(path: Path, robot: Environment) -> Memory:
     check_regular(path)
     with path.open("rb") as file:
         recorded = file.read(len(_SQLITE)) == _SQLITE
-    found = list(_recorded(path, robot) if recorded else _listed(path, robot))
-    if not found:
+    exemplars = list(_recorded(path, robot) if recorded else _listed(path, robot))
+    if not exemplars:
         raise RunError(f"{path} holds no movements to begin with")
-    contexts, thetas, outcomes = (np.stack(each) for each in zip(*found, strict=True))
+    contexts, thetas, outcomes = (np.stack(column) for column in zip(*exemplars, strict=True))
     robot.contexts.check(f"contexts of {path}", contexts)
     robot.policies.check(f"thetas of {path}", thetas)
     memory = Memory(robot.contexts.dim, robot.policies.dim, robot.outcomes.dim)
@@ -47,17 +47,21 @@ def past_of(path: Path, robot: Environment) -> Memory:
 
 def _recorded(path: Path, robot: Environment) -> Iterator[Exemplar]:
     """Exemplars of a record; a run says in which boxes, with which units."""
-    here = {"contexts": robot.contexts, "policies": robot.policies, "outcomes": robot.outcomes}
+    boxes = {"contexts": robot.contexts, "policies": robot.policies, "outcomes": robot.outcomes}
     dims = robot.contexts.dim, robot.policies.dim, robot.outcomes.dim
     with Record(path) as record:
         if record.dims != dims:
             raise RunError(f"{path} has dims {record.dims} of context, theta, outcome, this robot has {dims}")
         for name, given in record.about.get("spaces", {}).items():
-            there, box = Box(*given), here[name]
-            if there.unit != box.unit:
-                raise RunError(f"{name} of {path} are in {there.unit or 'no unit'}, here in {box.unit or 'no unit'}")
-            if name != "outcomes" and not (np.array_equal(there.low, box.low) and np.array_equal(there.high, box.high)):
-                raise RunError(f"{name} of {path} lie in {there.low} to {there.high}, here in {box.low} to {box.high}")
+            recorded, box = Box(*given), boxes[name]
+            if recorded.unit != box.unit:
+                raise RunError(f"{name} of {path} are in {recorded.unit or 'no unit'}, here in {box.unit or 'no unit'}")
+            if name != "outcomes" and not (
+                np.array_equal(recorded.low, box.low) and np.array_equal(recorded.high, box.high)
+            ):
+                raise RunError(
+                    f"{name} of {path} lie in {recorded.low} to {recorded.high}, here in {box.low} to {box.high}"
+                )
         for event in record.events():
             if event.kind in (Kind.MOVED, Kind.ADDED):
                 assert event.context is not None
@@ -80,10 +84,10 @@ def _listed(path: Path, robot: Environment) -> Iterator[Exemplar]:
     more = [f"{name}_{box.dim}" for name, box in boxes.items() if f"{name}_{box.dim}" in heads]
     if lacking or more:
         why = f"lacks the column {lacking[0]}" if lacking else f"has a column {more[0]}, so it is of another robot"
-        raise RunError(f"{path} {why}; this robot needs {', '.join(each for names in wanted for each in names)}")
+        raise RunError(f"{path} {why}; this robot needs {', '.join(name for names in wanted for name in names)}")
     for number, row in enumerate(rows, 2):
         try:
-            context, theta, outcome = (np.array([parsed(row[each] or "", float) for each in names]) for names in wanted)
+            context, theta, outcome = (np.array([parsed(row[name] or "", float) for name in names]) for names in wanted)
         except ValueError as error:
             raise RunError(f"{path}: line {number} is no movement of {sum(map(len, wanted))} numbers") from error
         yield context, theta, outcome

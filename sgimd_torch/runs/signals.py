@@ -20,7 +20,7 @@ from functools import partial
 from types import FrameType
 from typing import Any, Final, Self, TextIO
 
-from sgimd_torch.options.signature import parsed, wanted
+from sgimd_torch.options.signature import parsed
 
 REPORT_EVERY: Final = 20.0  # s between two lines of progress if stderr is no terminal
 SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
@@ -104,8 +104,8 @@ def parsed_argument(text: str, kind: Any) -> Any:
     """
     try:
         return parsed(text, kind)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"must be {wanted(kind)}, got {text.strip()!r}") from None
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def _sink() -> TextIO:

@@ -151,8 +151,7 @@ def variants_of(varied: Sequence[str], options: Sequence[str]) -> tuple[list[Con
         options: options of ``sgimd run`` for all runs.
 
     Raises:
-        ValueError: an option cannot be varied, or is given twice.
-        SystemExit: ``sgimd run`` refused an option and printed the reason.
+        ValueError: an option cannot be varied, is given twice, or is refused by ``sgimd run``.
     """
     given = [dashed(word.partition("=")[0].removeprefix("--")) for word in options if word.startswith("--")]
     values: dict[str, list[str]] = {}

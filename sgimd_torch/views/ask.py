@@ -90,8 +90,8 @@ def _answers(
     context = robot.contexts.check("--context", middle if given is None else given)
     if not len(parts.learner.memory):
         raise ValueError(f"{parts.config.directory} has an empty memory, so it infers no movement")
-    for k, each in enumerate(goals):
-        goal = robot.outcomes.check("goal", each, "it is a point of T, such as 0.3,0.2")
+    for k, point in enumerate(goals):
+        goal = robot.outcomes.check("goal", point, "it is a point of T, such as 0.3,0.2")
         estimate = inverse(context, goal)
         theta, expected = estimate.theta, estimate.expected
         answer = {"goal": goal, "context": context, "theta": theta}
@@ -109,16 +109,16 @@ def _answers(
 def _read(path: Path, box: Box) -> list[list[float]]:
     """The goals in a file; a first line of names is a header."""
     rows = [row for row in csv.reader(path.read_text(encoding="utf-8").splitlines()) if row]
-    found = list[list[float]]()
+    goals = list[list[float]]()
     for number, row in enumerate(rows):
         try:
-            found.append([parsed(cell, float) for cell in row])
+            goals.append([parsed(cell, float) for cell in row])
         except ValueError as error:
             if number or not all(cell.strip()[:1].isalpha() for cell in row):
                 raise ValueError(
                     f"{path}: row {number + 1} is no goal of {box.dim} numbers: {','.join(row)}"
                 ) from error
-    return found
+    return goals
 
 
 def _write_trajectory(path: Path, parts: RunParts, theta: Array) -> None:

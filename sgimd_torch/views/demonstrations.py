@@ -45,7 +45,7 @@ from sgimd_torch.runs.signals import parsed_argument, parser_of, say
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.runs.tasks.taught import Replaying, theta_of
 from sgimd_torch.spaces import Array, Box, Demonstration, stream
-from sgimd_torch.views.text_table import print_table
+from sgimd_torch.views.results import print_table
 
 HEADS: Final = ("recording", "lasts (s)", "samples", "says", "lands", "apart", "misfit", "remarks")
 

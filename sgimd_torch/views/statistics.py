@@ -1,8 +1,8 @@
-"""Statistics over seeds: interquartile means, bootstrap intervals, probability of improvement.
+"""Statistics over seeds: interquartile means and bootstrap intervals.
 
 Agarwal et al. (2021), "Deep reinforcement learning at the edge of the statistical precipice": with few seeds, every
 number needs an interval. ``errors`` are mean benchmark errors (m), one for each seed; smaller is better.
-    found = iqm_interval(errors, rng=rng()); show(found)
+    number = iqm_interval(errors, rng=rng()); show(number)
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from typing import Final, NamedTuple
 
 import numpy as np
-from scipy import optimize, stats
+from scipy import stats
 
 from sgimd_torch.spaces import Array
 
@@ -34,15 +34,10 @@ def rng() -> np.random.Generator:
     return np.random.default_rng(SEED)
 
 
-def show(found: Interval, form: str = ".2f", unit: str = "") -> str:
+def show(number: Interval, form: str = ".2f", unit: str = "") -> str:
     """A text such as ``0.48 [0.45, 0.52] m``; without an interval, no brackets. Minus signs are ASCII, for programs."""
-    between = "" if np.isnan(found.low) else f" [{found.low:{form}}, {found.high:{form}}]"
-    return f"{found.value:{form}}{between}{f' {unit}' if unit else ''}"
-
-
-def metres(found: Interval, form: str = "+.4f") -> str:
-    """A text for a difference in metres with its sign: ``−0.0103 [−0.0162, −0.0074] m``."""
-    return show(found, form, "m").replace("-", "−")
+    between = "" if np.isnan(number.low) else f" [{number.low:{form}}, {number.high:{form}}]"
+    return f"{number.value:{form}}{between}{f' {unit}' if unit else ''}"
 
 
 def interquartile_mean(values: Array) -> Array:
@@ -93,7 +88,7 @@ def interval(
         return statistic(*(sample[row] for sample, row in zip(samples, rows, strict=True)))
 
     rows = [np.arange(len(sample)) for sample in samples]
-    found = stats.bootstrap(
+    bootstrapped = stats.bootstrap(
         rows,
         of_rows,
         n_resamples=RESAMPLES,
@@ -103,7 +98,7 @@ def interval(
         method="percentile",
         rng=rng,
     )
-    return Interval(float(statistic(*samples)), *map(float, found.confidence_interval))
+    return Interval(float(statistic(*samples)), *map(float, bootstrapped.confidence_interval))
 
 
 def iqm_interval(*strata: Array, rng: np.random.Generator, level: float = LEVEL) -> Interval:
@@ -125,47 +120,6 @@ def over_seeds(values: Array) -> Interval | None:
     if not len(values) or not np.isfinite(values).all():
         return None
     return point(float(values[0])) if len(values) == 1 else iqm_interval(values, rng=rng())
-
-
-def improvement(ours: Array, theirs: Array) -> Array:
-    """Probability of improvement: share of the pairs (one of our errors, one of theirs) in which ours is smaller.
-
-    The errors are ``(..., n)`` and ``(..., m)``; a tie counts half. The share is the Mann-Whitney statistic divided by
-    n m; see Agarwal et al. (2021).
-    """
-    x, y = np.asarray(ours)[..., :, None], np.asarray(theirs)[..., None, :]
-    shares: Array = np.mean((x < y) + 0.5 * (x == y), axis=(-2, -1))
-    return shares
-
-
-def improvement_interval(ours: Array, theirs: Array, *, level: float = LEVEL) -> Interval:
-    """``improvement`` of ours ``(n,)`` over theirs ``(m,)``, with a score interval, which stays wide for few seeds.
-
-    Wilson's interval for this statistic has all probabilities that the data do not reject (Newcombe 2006, Statistics in
-    Medicine 25:559, method 5). If all our errors are smaller than all of theirs, the interval is [.80, 1] with 10 seeds
-    and [.90, 1] with 20; a bootstrap would give [1, 1] even with 2 seeds. If errors are normal, the interval has the
-    true value in 95 to 98 % of cases with 5, 10 or 20 seeds. With fewer than ``LEAST_SEEDS``, the result is a `point`.
-
-    Raises:
-        ValueError: a side has fewer than 2 seeds, or an error is not finite.
-    """
-    for sample in (ours, theirs):
-        if len(sample) < 2 or not np.isfinite(sample).all():
-            raise ValueError(f"an interval needs 2 or more seeds with finite errors, got {np.asarray(sample).tolist()}")
-    n, m, found = len(ours), len(theirs), float(improvement(ours, theirs))
-    if min(n, m) < LEAST_SEEDS:
-        return point(found)
-    z = float(stats.norm.isf((1 - level) / 2))
-
-    def excess(p: float) -> float:
-        """Squared distance from p to the statistic, minus z^2 times the variance under p; above 0, p is rejected."""
-        variance = p * (1 - p) * (1 + ((n + m) / 2 - 1) * ((1 - p) / (2 - p) + p / (1 + p))) / (n * m)
-        return (found - p) ** 2 - z * z * variance
-
-    inside = float(np.clip(found, 1e-9, 1 - 1e-9))
-    low = optimize.brentq(excess, 0.0, inside) if found > 0 else 0.0
-    high = optimize.brentq(excess, inside, 1.0) if found < 1 else 1.0
-    return Interval(found, low, high)
 
 
 def common_differences(ours: Mapping[int, float], theirs: Mapping[int, float]) -> Array:

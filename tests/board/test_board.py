@@ -20,8 +20,8 @@ from runs import arguments, content_of, end, stopped_at
 from sgimd_torch import InterestMap, stream
 from sgimd_torch.board import pictures
 from sgimd_torch.board.curves import Behaviour, branches, of_evaluation, of_regions
-from sgimd_torch.board.events import EventFile
 from sgimd_torch.board.legend import LEGEND
+from sgimd_torch.board.listener import EventFile
 from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.figures.sections import sections
 from sgimd_torch.options.command_line import main

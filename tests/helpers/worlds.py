@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
@@ -161,12 +162,12 @@ def executed(arm: PlanarArm, thetas: Array) -> Memory:
     return memory
 
 
-ALGORITHMS = {
-    "random": lambda arm, seed: random_exploration(arm, seed),
-    "sagg-riac": lambda arm, seed: sagg_riac(arm, seed),
-    "observation": lambda arm, seed: observation(arm, seed, correspondence=last_posture),
-    "imitation": lambda arm, seed: imitation(arm, seed, correspondence=last_posture),
-    "sgim-d": lambda arm, seed: sgim_d(arm, seed, correspondence=last_posture),
+ALGORITHMS: dict[str, Callable[..., Learner]] = {
+    "random": random_exploration,
+    "sagg-riac": sagg_riac,
+    "observation": partial(observation, correspondence=last_posture),
+    "imitation": partial(imitation, correspondence=last_posture),
+    "sgim-d": partial(sgim_d, correspondence=last_posture),
 }
 TAUGHT = {"observation", "imitation", "sgim-d"}
 

@@ -41,7 +41,7 @@ SIGNATURES = {"signature", "Signature", "getfullargspec", "parameters_of", "__co
 OPTIONS = {  # files and definitions that may read the parameters of a function; why
     ("options/signature", None): "the signature is the option",
     ("options/config", None): "options of the parts that a run has chosen",
-    ("options/catalogue", "call_checked"): "refuses what a user's own function does not take",
+    ("options/built", "call_checked"): "refuses what a user's own function does not take",
 }
 
 

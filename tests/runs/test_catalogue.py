@@ -124,7 +124,7 @@ def test_an_option_of_a_users_goal_model_is_its_parameter_and_nothing_else(toss,
     said = capsys.readouterr().out
     assert re.search(r"--goals.window .*\n? *number of goals .*default: 8", said), said
     assert command(main, [*words_, "--goals.window", "x"]) == 2
-    assert "--goals.window must be a whole number, got x" in capsys.readouterr().err
+    assert "--goals.window must be a whole number, got 'x'" in capsys.readouterr().err
 
 
 def test_goals_all_over_a_space_are_at_most_500_and_inside():

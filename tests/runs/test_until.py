@@ -108,8 +108,7 @@ def test_a_robot_without_goals_of_evaluation_is_asked_about_goals_within_reach(t
 
 @pytest.mark.parametrize("until", ["0", "-1", "nan", "inf", "soon", "0.1,0.2"])
 def test_a_limit_that_is_no_error_is_refused_in_a_line(tmp_path, capsys, until):
-    with pytest.raises(SystemExit):
-        main([*ARM.split(), f"--out={tmp_path}", f"--until={until}"])
+    assert command(main, [*ARM.split(), f"--out={tmp_path}", f"--until={until}"]) == 2
     said = capsys.readouterr().err.splitlines()
     assert said[0].startswith(("error: until must be an error above 0", "error: --until must be a number"))
     assert len(said) == 2

@@ -24,9 +24,8 @@ from sgimd_torch.views import check
 from sgimd_torch.views.film import command as film
 from sgimd_torch.views.film.camera import Camera
 from sgimd_torch.views.film.model_camera import viewing
-from sgimd_torch.views.film.panel import panel
 from sgimd_torch.views.film.reel import PAUSE, RATES, Shot, write_film
-from sgimd_torch.views.film.sketch import Sketchbook
+from sgimd_torch.views.film.sketch import Sketchbook, panel
 
 THETAS = stream(0, "film").random((100, 25))[40:]  # some reach the water before the line is let out
 RATE = RATES[".mp4"]

@@ -20,7 +20,7 @@ from sgimd_torch.runs.signals import command
 from sgimd_torch.spaces import Box
 from sgimd_torch.views.report import command as report
 from sgimd_torch.views.report import figures, provenance
-from sgimd_torch.views.report.page import page
+from sgimd_torch.views.report.command import page
 from sgimd_torch.views.statistics import interquartile_mean
 from sgimd_torch.views.variants import Variant
 
@@ -186,7 +186,7 @@ def test_errors_are_those_of_finished_runs_and_unfinished_ones_are_named(runs, r
     cut = replace(other, index=other.index[:25], summary={**other.summary, "finished": False})
     variant = Variant("sgim-d", [run, cut])
     assert variant.used == [run]
-    assert f"{cut.path}: 25 of 60 movements" in "".join(provenance.doubts([variant]))
+    assert f"{cut.path}: 25 of 60 movements" in "".join(provenance.warnings([variant]))
     assert Variant("sgim-d", [cut]).used == [cut]  # if there is nothing better
 
 
@@ -286,7 +286,7 @@ def test_the_commands_make_the_same_runs_again(pages, runs):
 )
 def test_doubtful_versions_are_reported(run, commits, warning):
     made_by = [replace(run, versions={**run.versions, "commit": commit}) for commit in commits]
-    (few, *said) = provenance.doubts([Variant("sgim-d", made_by)])
+    (few, *said) = provenance.warnings([Variant("sgim-d", made_by)])
     assert "Fewer than 5 seeds" in few
     assert len(said) == bool(warning)
     assert warning in "".join(said)
@@ -301,7 +301,7 @@ def test_doubtful_versions_are_reported(run, commits, warning):
 )
 def test_what_cannot_be_compared_is_said(run, change, warning):
     other = replace(run, **{name: {**getattr(run, name), **values} for name, values in change.items()})
-    assert warning in "".join(provenance.doubts([Variant("sgim-d", [run, other])])).replace("SGIM-D", "sgim-d")
+    assert warning in "".join(provenance.warnings([Variant("sgim-d", [run, other])])).replace("SGIM-D", "sgim-d")
 
 
 def test_the_same_runs_give_the_same_page(runs, pages, tmp_path):

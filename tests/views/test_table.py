@@ -16,6 +16,7 @@ from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.signals import command
 from sgimd_torch.views import variants
 from sgimd_torch.views.report import command as report
+from sgimd_torch.views.results import print_table
 from sgimd_torch.views.table import main
 
 SEEDS = 5
@@ -246,3 +247,12 @@ def test_a_baseline_that_is_no_variant_is_refused_with_the_near_name(runs, capsy
     assert not said.out
     assert "'randon'; did you mean random? Known are random, sgim-d" in said.err
     assert said.err.count("\n") == 1
+
+
+def test_columns_are_as_wide_as_their_widest_cell_and_lines_end_with_text(capsys):
+    print_table([("task", "error (m)", "seeds"), ("planar-arm-50", "0.1", "3"), ("toss", "0.25", "")])
+    assert capsys.readouterr().out.splitlines() == [
+        "task           error (m)  seeds",
+        "planar-arm-50  0.1        3",
+        "toss           0.25",
+    ]

@@ -68,17 +68,17 @@ class Camera:
         mujoco.mj_setState(self._model, self._data, recording.states[row], mujoco.mjtState.mjSTATE_FULLPHYSICS)
         mujoco.mj_forward(self._model, self._data)
         self._renderer.update_scene(self._data, camera="shore")
-        scene, here = self._renderer.scene, recording.float_at(time)
+        scene, float_at_time = self._renderer.scene, recording.float_at(time)
         for radius in (0.5, 1.0):
             draw_chain(scene, _circle(np.zeros(2), radius), 0, _RING)
         for landing in shot.past[:: max(1, math.ceil(len(shot.past) / MOST_PAST))]:
             draw(scene, mujoco.mjtGeom.mjGEOM_BOX, (0.007, 0.007, 0.001), np.append(landing, 0.001), PAST)
         draw_chain(scene, _circle(shot.goal, 0.06), 0.008, GOAL)
-        draw_chain(scene, [*(recording.float_at(t) for t in np.arange(0.0, time, 0.02)), here], 0, _PATH)
+        draw_chain(scene, [*(recording.float_at(t) for t in np.arange(0.0, time, 0.02)), float_at_time], 0, _PATH)
         loose = recording.let_out is not None and time > recording.let_out
         hinges = [] if loose else self._data.xpos[self._line]
-        draw_chain(scene, [self._data.site_xpos[self._tip], *hinges, here], 0.003, _INK)
-        draw(scene, mujoco.mjtGeom.mjGEOM_SPHERE, (0.026, 0, 0), here, _FLOAT).emission = 0.4
+        draw_chain(scene, [self._data.site_xpos[self._tip], *hinges, float_at_time], 0.003, _INK)
+        draw(scene, mujoco.mjtGeom.mjGEOM_SPHERE, (0.026, 0, 0), float_at_time, _FLOAT).emission = 0.4
         if time == recording.landed:
             draw_chain(scene, [np.append(shot.goal, 0.006), np.append(recording.outcome, 0.006)], 0.005, GOAL)
         return Image.fromarray(self._renderer.render())

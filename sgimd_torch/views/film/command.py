@@ -33,9 +33,8 @@ from sgimd_torch.runs.load import OpenRun
 from sgimd_torch.runs.read import Run
 from sgimd_torch.runs.signals import parser_of, say
 from sgimd_torch.spaces import Array, stream
-from sgimd_torch.views.film.panel import panel
 from sgimd_torch.views.film.reel import RATES, Painter, Shot, shoot, write_film
-from sgimd_torch.views.film.sketch import Sketchbook
+from sgimd_torch.views.film.sketch import Sketchbook, panel
 
 EXAMPLES = """examples:
   sgimd film runs/sgim-d/seed-003                               six goals, into runs/sgim-d/seed-003.mp4
@@ -77,8 +76,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             options.out, tqdm(shoot(painter, shots, rate), "filming", n, unit=" frames", delay=1.0, disable=None)
         )
     amount, missed = parts.environment.outcomes.amount, np.reshape([shot.missed for shot in shots], (len(stages), -1))
-    for movements, each in zip(stages, missed, strict=True):
-        mean, most = amount(each.mean()), amount(each.max())
+    for movements, distances in zip(stages, missed, strict=True):
+        mean, most = amount(distances.mean()), amount(distances.max())
         print(f"after {movements} movements: mean distance to the goal {mean}, at most {most}")
     print(f"Film {options.out}")
     return 0
@@ -148,10 +147,10 @@ def _cast(run: OpenRun, goals: Array, context: Array, stages: Sequence[int]) -> 
         for k, goal in enumerate(goals):
             recording = picture(context, inverse(context, goal).theta, stream(seed, "film", k))
             shots.append(Shot(recording, goal, context, title, robot.outcomes.unit, past))
-        found = evaluate(inverse, robot, benchmark.goals, seed, movements, context=context, repeats=0)
-        errors.append(found.errors)
+        evaluation = evaluate(inverse, robot, benchmark.goals, seed, movements, context=context, repeats=0)
+        errors.append(evaluation.errors)
         reached.append(movements)
-    curve = np.array(reached), np.array([each.mean() for each in errors])
+    curve = np.array(reached), np.array([errors_of_stage.mean() for errors_of_stage in errors])
     if len(reached) == 1 and len(recorded.evaluation["movements"]):
         curve = recorded.evaluation["movements"], recorded.evaluation["mean_error"]
     ink = colour(config["algorithm"])

@@ -122,13 +122,13 @@ def viewing(model: mujoco.MjModel, data: mujoco.MjData, points: Array) -> int | 
 def _edges(robot: MujocoRobot, shot: Shot) -> Array:
     """``(n_edges, 2, 3)`` m, the edges of T in the world, for each measured place."""
     corners = np.array(list(product(*zip(robot.outcomes.low, robot.outcomes.high, strict=True))))
-    places, found = robot.located(corners, robot.start_in(shot.context)), dict[bytes, Array]()
+    places, edges = robot.located(corners, robot.start_in(shot.context)), dict[bytes, Array]()
     for one, other in combinations(range(len(corners)), 2):
         if (corners[one] != corners[other]).sum() == 1:
             for edge in places[[one, other]].swapaxes(0, 1):
                 if not np.array_equal(*edge):
-                    found[edge.tobytes()] = edge
-    return np.array([*found.values()]).reshape(-1, 2, 3)
+                    edges[edge.tobytes()] = edge
+    return np.array([*edges.values()]).reshape(-1, 2, 3)
 
 
 def _filmed(shot: Shot) -> Filmed:
