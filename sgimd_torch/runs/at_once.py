@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any
 
-from sgimd_torch.environments.protocol import BatchEnvironment, Environment, Limited
+from sgimd_torch.environments.protocol import BatchEnvironment, Environment, RobotCount
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.session import Execute, live
 from sgimd_torch.spaces import Array, Failure
@@ -27,7 +27,7 @@ def check_at_once(environment: Environment, at_once: int) -> None:
     Raises:
         ValueError: the environment has a lower limit.
     """
-    if isinstance(environment, Limited) and at_once > environment.at_once:
+    if isinstance(environment, RobotCount) and at_once > environment.at_once:
         name = type(environment).__name__
         raise ValueError(f"at_once must be at most {environment.at_once}, the at_once of {name}, got {at_once}")
 

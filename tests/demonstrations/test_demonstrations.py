@@ -10,7 +10,7 @@ import pytest
 from sgimd_torch.demonstrations import SHIPPED, load_demonstrations, save_demonstrations
 from sgimd_torch.demonstrations.fit import misfit_of
 from sgimd_torch.environments.fishing_rod import JOINT_RANGES, FishingRod
-from sgimd_torch.runs.tasks.rods import fishing_rod
+from sgimd_torch.runs.tasks.robots import fishing_rod
 from sgimd_torch.runs.tasks.taught import demonstrations_of
 from sgimd_torch.spaces import Array, Demonstration, stream
 

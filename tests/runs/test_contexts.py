@@ -1,10 +1,8 @@
 """Runs where there are contexts: their evaluations draw them, and say the error by context."""
 
 import numpy as np
-import pytest
 
 from runs import content_of
-from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.evaluation import contexts_of_goals
 from sgimd_torch.options.build import task_of
 from sgimd_torch.options.command_line import main
@@ -23,12 +21,6 @@ def test_the_rod_in_the_wind_is_a_task():
     assert [shown.context.tolist() for shown in demonstrations] == [[0.0]] * 127
     contexts = contexts_of_goals(robot, 200)
     assert np.ptp(contexts) > 0.09
-
-
-def test_the_long_rod_is_a_task_without_context():
-    robot = task_of(Config(parts={"environment.line": 1.5, "environment.noise": 0.01})).environment
-    assert (robot.noise, robot.contexts.dim) == (0.01, 0)
-    assert robot.model.body("line_07").mass == pytest.approx(1.5 * FishingRod().model.body("line_07").mass)
 
 
 def test_the_rod_in_the_wind_is_run_taught_and_resumed(tmp_path, benchmark):

@@ -56,7 +56,7 @@ def test_options_are_crossed_and_each_combination_has_its_name():
     assert names(["algorithm=random,sgim-d"]) == ["random", "sgim-d"]
     assert names([], "--algorithm", "sagg-riac") == ["sagg-riac"]
     assert names(["goals=uniform,uniform"]) == ["goals=uniform"]
-    assert names(["environment.line=1,1.5"]) == ["environment.line=1", "environment.line=1.5"]
+    assert names(["environment.noise=1,1.5"]) == ["environment.noise=1", "environment.noise=1.5"]
     assert names(["demonstrations=/far/away/mine.npz"], "--algorithm", "sgim-d") == ["demonstrations=mine.npz"]
     # Their order does not change where runs go.
     assert names(["goals=uniform", "algorithm=sgim-d"]) == ["sgim-d,goals=uniform"]
