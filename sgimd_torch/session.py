@@ -17,6 +17,7 @@ import traceback
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
+from itertools import chain
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -124,9 +125,11 @@ def run(
     before: dict[int, BeforeMovement] = {}
     with ExitStack() as at_the_end:
         if record is not None:
-            from sgimd_torch.record.replay import replay  # most programs have no record
+            events = record.events()
+            if (first_event := next(events, None)) is not None:
+                from sgimd_torch.record.replay import replay  # a new life has nothing to replay
 
-            before = yield from replay(learner, record.events(), teacher=teacher)
+                before = yield from replay(learner, chain([first_event], events), teacher=teacher)
             learner.listeners.append(record.add)
             at_the_end.callback(learner.listeners.remove, record.add)
         failed_in_a_row: list[Failure] = []
