@@ -233,7 +233,6 @@ RUN: Final = options_of(Config)
 """Options of every run."""
 FLAGS: Final = {
     "resume": "flag: go on with a stopped or killed run, or lengthen a finished one.",
-    "accept_loss": "flag, with --resume: go on from the damage in a damaged record; a copy of the file is kept.",
 }
 
 
