@@ -118,7 +118,7 @@ def task_of(config: Config) -> Task:
 
 def with_found(config: Config, robot: Environment) -> Config:
     """The settings, with the options that the robot found by movements, such as the corners of T."""
-    values = robot.found if isinstance(robot, FromFiles) else {}
+    values = robot.found_options if isinstance(robot, FromFiles) else {}
     options = {f"environment.{name}": value for name, value in values.items() if f"environment.{name}" in config}
     return replace(config, parts={**dict(config.parts), **options})
 

@@ -225,10 +225,10 @@ def test_outcomes_are_located_in_the_world_from_where_the_movement_begins(here):
 def test_what_was_found_is_given_to_the_next_robot_which_makes_no_movement(here, monkeypatch):
     options = {"model": "arm.xml", "outcome": "site:tip:xy", "noise": 0.01}
     first = MujocoRobot(**options)
-    assert first.found.keys() == {*MujocoRobot.FOUND}
+    assert first.found_options.keys() == {*MujocoRobot.FOUND_OPTIONS}
     monkeypatch.setattr(MujocoRobot, "_simulate", lambda *_: pytest.fail("it moved"))
-    second = MujocoRobot(**options, **first.found)
-    assert second.found == first.found
+    second = MujocoRobot(**options, **first.found_options)
+    assert second.found_options == first.found_options
     assert second.outcome_noise == first.outcome_noise > 0
     assert second.remarks == []
 
