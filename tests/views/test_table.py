@@ -83,7 +83,7 @@ def test_numbers_are_interquartile_means_with_intervals_if_there_are_five_seeds_
 def test_csv_has_all_digits_and_columns_of_the_ends_of_intervals(runs, capsys):
     assert table(runs, "--at", 40, "--format", "csv") == 0
     rows = {row["variant"]: row for row in csv.DictReader(io.StringIO(capsys.readouterr().out))}
-    found = variants.Variant("random", variants.read(runs)["random"], 40).last_error
+    found = variants.Variant("random", variants.read_runs(runs)["random"], 40).last_error
     cells = [rows["random"][f"error (m){end}"] for end in ("", " low", " high")]
     assert tuple(map(float, cells)) == found
     assert rows["sgim-d"]["error (m) low"] == ""
