@@ -5,10 +5,9 @@ if all pass, it survives, and a test is missing. Each mutant is tried with the t
 the tests marked slow; at the end, the tests that failed are carried out without a mutant. The working tree does not
 change. All mutants take about 10 minutes of processor time.
 
-    python scripts/mutants.py                        # all mutants
+    python scripts/mutants.py                        # all mutants; with --list, only their numbers and names
     python scripts/mutants.py 7 12 simplex           # numbers 7 and 12, and all whose names contain "simplex"
     python scripts/mutants.py --commit HEAD~3        # the code of a commit, in place of the working tree
-    python scripts/mutants.py --list                 # numbers, names and places; nothing runs
 """
 
 from __future__ import annotations
@@ -37,9 +36,9 @@ eq. (3): progress is twice as large | goals/regions.py | goals/test_regions.py
     / (2 * half)) ==> / half)
 interest by the oldest goals of a region | goals/regions.py | goals/test_regions.py
     competences[-window:] ==> competences[:window]
-eq. (4): the least interest is not subtracted | goals/tiling.py | goals/test_interest.py
+eq. (4): the least interest is not subtracted | goals/regions.py | goals/test_interest.py
     interests - interests.min() ==> interests
-modes 1 and 2 have each other's probability | goals/tiling.py | goals/test_interest.py
+modes 1 and 2 have each other's probability | goals/regions.py | goals/test_interest.py
     (0.7, 0.2, 0.1) ==> (0.2, 0.7, 0.1)
 split one goal too early | goals/interest_map.py | goals/test_interest.py
     <= self.g_max: ==> < self.g_max:
@@ -99,6 +98,10 @@ requests: costs do not count | asking/interest.py | asking/test_interest.py
     - np.log(cost) ==> - 0 * np.log(cost)
 record: the outcome in the columns of the goal | record/layout.py | record/test_record.py
     *_cells(event.goal, t), ==> *_cells(event.outcome, t),
+record: NaN is kept as a number | record/layout.py | record/test_record.py
+    (None if value != value else ==> (value if value != value else
+record: the last rows come first | record/__init__.py | record/test_record.py
+    ORDER BY rowid LIMIT ==> ORDER BY -rowid LIMIT
 replay: another theta is accepted | record/replay.py | learner/test_life.py
     if not box.same(recorded, now): ==> if now is recorded:
 replay: another demonstration is accepted | record/replay.py | learner/test_life.py
@@ -107,7 +110,7 @@ random streams: of a name only the first letter counts | spaces.py | test_spaces
     *name.encode() ==> *name[:1].encode()
 failures: a failed movement does not count | learner/__init__.py | learner/test_failures.py
     self.movements += 1 ==> self.movements += not isinstance(outcome, Failure)
-at once: attempts are replayed out of order | learner/__init__.py | learner/test_at_once.py
+at once: attempts are replayed out of order | learner/__init__.py | learner/test_life.py
     return [] if in_order else ==> return [] if reported else
 """
 

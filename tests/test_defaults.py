@@ -13,7 +13,6 @@ from sgimd_torch.options.config import RUN, Config
 
 SGIM_D = {
     "environment": "fishing-rod",
-    "environment.line": 1.0,
     "environment.max_wind": 0.0,
     "environment.noise": 0.032,
     "environment.task_space": 1.0,

@@ -99,7 +99,8 @@ def _split(lines: Sequence[str], mark: str) -> list[list[str]]:
     if mark == " ":
         return [line.split() for line in lines]
     try:
-        return [[field.strip() for field in next(csv.reader([line], delimiter=mark))] for line in lines]
+        rows = (next(csv.reader([line], delimiter=mark, skipinitialspace=True)) for line in lines)
+        return [[field.strip() for field in row] for row in rows]
     except csv.Error as error:
         raise ValueError(f"it is no table: {error}") from error
 

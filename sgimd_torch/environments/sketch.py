@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -75,6 +75,15 @@ def _drawn(name: str, given: ArrayLike, wanted: str, axes: int) -> Array:
     if value.size == 0 or value.dtype.kind not in "iuf" or not np.isfinite(value).all() or value.ndim != axes:
         raise ValueError(f"{name} of a Sketch must be finite numbers {wanted}, got shape {value.shape}")
     return read_only(value.astype(np.float64))
+
+
+@runtime_checkable
+class Drawn(Protocol):
+    """An environment whose movements can be filmed."""
+
+    def trace(self, context: Array, theta: Array, rng: np.random.Generator) -> Trace:
+        """The trajectory of a movement. Its outcome must equal that of ``execute`` with an equal random stream."""
+        ...
 
 
 Tracer = Callable[[Array, Array, np.random.Generator], Trace]

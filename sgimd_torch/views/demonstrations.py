@@ -37,13 +37,13 @@ from sgimd_torch.demonstrations.columns import ColumnNames, Recording
 from sgimd_torch.demonstrations.fit import beyond_limits, misfit_of
 from sgimd_torch.demonstrations.text import read_text
 from sgimd_torch.demonstrations.units import in_units, paced
-from sgimd_torch.environments.protocol import SimulationError, execute_many, primitive_of
+from sgimd_torch.environments.protocol import Replaying, SimulationError, execute_many, primitive_of
 from sgimd_torch.files import check_regular
 from sgimd_torch.options.build import task_of
 from sgimd_torch.options.command_line import parse
 from sgimd_torch.runs.signals import parsed_argument, parser_of, say
 from sgimd_torch.runs.tasks import Task
-from sgimd_torch.runs.tasks.taught import Replaying, theta_of
+from sgimd_torch.runs.tasks.taught import theta_of
 from sgimd_torch.spaces import Array, Box, Demonstration, stream
 from sgimd_torch.views.results import print_table
 

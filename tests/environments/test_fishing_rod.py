@@ -35,7 +35,6 @@ def cast(rod: FishingRod, theta: Array, context: Array = NO_CONTEXT, seed: int =
     [
         {},
         {"max_wind": 0.02},
-        {"line": 1.5},
     ],
 )
 def test_the_rod_keeps_the_contract_of_environments(options: dict[str, float]) -> None:
@@ -179,27 +178,6 @@ def test_no_wind_is_no_context_and_the_world_is_mirrored_left_to_right(rod: Fish
     assert cast(rod, np.append(mirrored, theta[-1])) == pytest.approx(cast(rod, theta) * [-1, 1], abs=1e-6)
 
 
-@pytest.mark.parametrize("line", [0.5, 1.5])
-def test_a_float_on_another_line_hangs_as_much_lower_and_lands_elsewhere(rod: FishingRod, line: float) -> None:
-    other = FishingRod(noise=0.0, line=line, threads=1)
-    assert [mujoco.mj_id2name(other.model, mujoco.mjtObj.mjOBJ_BODY, i) for i in range(other.model.nbody)] == [
-        mujoco.mj_id2name(rod.model, mujoco.mjtObj.mjOBJ_BODY, i) for i in range(rod.model.nbody)
-    ]
-    hanging = {}
-    for each in (rod, other):
-        data = mujoco.MjData(each.model)
-        mujoco.mj_setState(each.model, data, each._caster.home, mujoco.mjtState.mjSTATE_FULLPHYSICS)
-        mujoco.mj_forward(each.model, data)
-        hanging[each] = float(data.site("tip").xpos[2] - data.site("float").xpos[2])
-    assert hanging[rod] == pytest.approx(0.42, abs=1e-3)
-    assert hanging[other] == pytest.approx(line * 0.42, abs=1e-3)
-    chain = slice(rod.model.body("line_01").id, rod.model.body("line_30").id + 1)
-    assert other.model.body_mass[chain] == pytest.approx(line * rod.model.body_mass[chain])
-    assert other.model.body("float").mass == rod.model.body("float").mass
-    apart = [np.linalg.norm(cast(other, theta) - cast(rod, theta)) for theta in movements(5)]
-    assert min(apart) > 0.005
-
-
 def test_replaying_a_movement_lands_where_executing_it_does(rod: FishingRod) -> None:
     step = rod.model.opt.timestep
     for theta in movements(5):
@@ -302,8 +280,6 @@ def test_re_executed_movements_scatter_as_the_paper_says() -> None:
         ({"noise": -0.1}, "noise"),
         ({"max_wind": np.inf}, "max_wind"),
         ({"max_wind": -1.0}, "max_wind"),
-        ({"line": 0.0}, "line"),
-        ({"line": float("nan")}, "line"),
         ({"threads": 0}, "threads"),
         ({"threads": 1.5}, "threads"),
         ({"outcomes": Box.cube(-1, 1, 3)}, "rest"),

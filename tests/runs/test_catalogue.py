@@ -22,7 +22,7 @@ from sgimd_torch.options.config import Config, words
 from sgimd_torch.options.help import overview
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.signals import command
-from sgimd_torch.runs.tasks import MOST_GOALS, goals_all_over
+from sgimd_torch.runs.tasks import MAX_GOALS, goals_all_over
 from sgimd_torch.session import run
 
 ENTRIES = [(kind, word) for kind, words in WORDS.items() for word in words]
@@ -137,7 +137,7 @@ def test_goals_all_over_a_space_are_at_most_500_and_inside():
     for dim in range(1, 7):
         space = Space(dim)
         goals = goals_all_over(space).goals
-        assert 200 < len(goals) <= MOST_GOALS
+        assert 200 < len(goals) <= MAX_GOALS
         assert space.outcomes.contains(goals).all()
         assert len(np.unique(goals, axis=0)) == len(goals)
         middle, half = (space.outcomes.low + space.outcomes.high) / 2, space.outcomes.sides / 2

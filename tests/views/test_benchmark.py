@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runs import settle
+from runs import write_about
 from sgimd_torch.evaluation import SIDES, load_benchmark, tile_side
 from sgimd_torch.options.command_line import main as live
 from sgimd_torch.runs.read import read_run
@@ -122,7 +122,7 @@ def test_a_unit_with_escape_codes_is_refused_and_does_not_reach_the_terminal(own
     run("--environment", "sliders:Slider2")
     found = read_run("runs/random/seed-000")
     spaces = {name: [box.low.tolist(), box.high.tolist(), box.names, "\x1b[31m"] for name, box in found.spaces.items()}
-    settle(Path("runs/random/seed-000"), spaces=spaces)
+    write_about(Path("runs/random/seed-000"), spaces=spaces)
     capsys.readouterr()
     assert command(main, ["runs", "--out", "goals.npz"]) == 2
     said = capsys.readouterr()
