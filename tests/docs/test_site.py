@@ -50,7 +50,8 @@ def site(tmp_path_factory):
 
 # Addresses that a browser fetches to show a page: those of all elements, except links to other pages.
 FETCHED = re.compile(
-    r"""<(?!a\s)(?![^>]*\srel=["']?(?:canonical|next|prev)\b)[^>]*\s(?:src|href|data|poster)=["']?((?:https?:)?//[^"' >]*)"""
+    r"""<(?!a\s)(?![^>]*\srel=["']?(?:canonical|next|prev)\b)"""
+    r"""[^>]*\s(?:src|href|data|poster)=["']?((?:https?:)?//[^"' >]*)"""
 )
 
 
