@@ -36,9 +36,9 @@ eq. (3): progress is twice as large | goals/regions.py | goals/test_regions.py
     / (2 * half)) ==> / half)
 interest by the oldest goals of a region | goals/regions.py | goals/test_regions.py
     competences[-window:] ==> competences[:window]
-eq. (4): the least interest is not subtracted | goals/tiling.py | goals/test_interest.py
+eq. (4): the least interest is not subtracted | goals/regions.py | goals/test_interest.py
     interests - interests.min() ==> interests
-modes 1 and 2 have each other's probability | goals/tiling.py | goals/test_interest.py
+modes 1 and 2 have each other's probability | goals/regions.py | goals/test_interest.py
     (0.7, 0.2, 0.1) ==> (0.2, 0.7, 0.1)
 split one goal too early | goals/interest_map.py | goals/test_interest.py
     <= self.g_max: ==> < self.g_max:
@@ -110,7 +110,7 @@ random streams: of a name only the first letter counts | spaces.py | test_spaces
     *name.encode() ==> *name[:1].encode()
 failures: a failed movement does not count | learner/__init__.py | learner/test_failures.py
     self.movements += 1 ==> self.movements += not isinstance(outcome, Failure)
-at once: attempts are replayed out of order | learner/__init__.py | learner/test_at_once.py
+at once: attempts are replayed out of order | learner/__init__.py | learner/test_life.py
     return [] if in_order else ==> return [] if reported else
 """
 

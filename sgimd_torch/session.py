@@ -17,7 +17,6 @@ import traceback
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from itertools import chain
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -125,11 +124,9 @@ def run(
     before: dict[int, BeforeMovement] = {}
     with ExitStack() as until_the_end:
         if record is not None:
-            events = record.events()
-            if (recorded := next(events, None)) is not None:
-                from sgimd_torch.record.replay import replay  # most programs have no record to replay
+            from sgimd_torch.record.replay import replay  # most programs have no record
 
-                before = yield from replay(learner, chain([recorded], events), teacher=teacher)
+            before = yield from replay(learner, record.events(), teacher=teacher)
             learner.listeners.append(record.add)
             until_the_end.callback(learner.listeners.remove, record.add)
         in_a_row: list[Failure] = []
@@ -195,19 +192,19 @@ def _asked(
     request = learner.request(context, place=place)
     if request is None:
         return before
-    answer, reply = _answer(learner, environment, context, request, teachers)
-    if answer is None:
+    demonstration, reply = _reply(learner, environment, context, request, teachers)
+    if demonstration is None:
         learner.go_on_alone(reply, place=place)
         return before._replace(request=request, reply=reply)
-    learner.watch(answer, place=place)
-    return BeforeMovement(answer, request, reply)
+    learner.watch(demonstration, place=place)
+    return BeforeMovement(demonstration, request, reply)
 
 
 def _executed(
     execute: Execute, first: int, contexts: Sequence[Array | Failure], moves: Sequence[Move | None]
 ) -> list[Array | Failure | None]:
     """For each robot its outcome, or why it has none; None: it rests. The first robot makes movement ``first``."""
-    outcomes: list[Array | Failure | None] = [each if isinstance(each, Failure) else None for each in contexts]
+    outcomes: list[Array | Failure | None] = [context if isinstance(context, Failure) else None for context in contexts]
     moving = [(first + k, contexts[k], move.theta) for k, move in enumerate(moves) if move is not None]
     if moving:
         for (index, *_), outcome in zip(moving, execute(*zip(*moving, strict=True)), strict=True):
@@ -230,7 +227,7 @@ def reason_of(error: BaseException) -> str:
     return "".join(sign if sign.isprintable() else " " for sign in said)[:300].strip()
 
 
-def _answer(
+def _reply(
     learner: Learner, environment: Environment, context: Array, request: Request, teachers: Mapping[str, Demonstrator]
 ) -> tuple[Demonstration | None, str]:
     """The demonstration that replies to a request (None: there is no new and usable one), and ``Episode.reply``.
@@ -241,12 +238,12 @@ def _answer(
     if name not in teachers:
         raise ValueError(f"the learner asks {name!r}, but teachers are {', '.join(teachers)}; are they its teachers?")
     try:
-        shown = teachers[name].demonstrate(context.copy(), request.goal, learner.memory)
-        if shown is None:
+        demonstration = teachers[name].demonstrate(context.copy(), request.goal, learner.memory)
+        if demonstration is None:
             return None, "nothing"
-        environment.contexts.check("context of the demonstration", shown.context)
-        environment.outcomes.check("outcome of the demonstration", shown.outcome)
-        return (None, "again") if learner.was_shown(shown) else (shown, "shown")
+        environment.contexts.check("context of the demonstration", demonstration.context)
+        environment.outcomes.check("outcome of the demonstration", demonstration.outcome)
+        return (None, "again") if learner.was_shown(demonstration) else (demonstration, "shown")
     except TimeoutError as error:
         said, reply = f"did not reply in time, so the learner goes on: {error}", "timed out"
     except (Exception, SystemExit) as error:  # no failure of a teacher may end the run
@@ -281,4 +278,4 @@ def _tried_together(
             raise ValueError(f"execute_many() must give {n} outcomes in rows, ({n}, {dim}), got {outcomes.shape}")
     except (Exception, SystemExit) as error:  # no failure of a robot may end the run
         return [Failure(reason_of(error), error)] * n
-    return [_tried("outcome", dim, lambda each=each: each) for each in outcomes]
+    return [_tried("outcome", dim, np.copy, outcome) for outcome in outcomes]

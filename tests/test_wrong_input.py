@@ -47,7 +47,7 @@ COMMANDS = {
     "runn": "unknown command 'runn'; did you mean run?",
     "run --algorithm sgimd": r"unknown algorithm 'sgimd'; did you mean sgim-d\? Known are",
     "run sgim-d": "'sgim-d' belongs to no option",
-    "run --resume yes": "'yes' belongs to no option; .* --resume, --accept-loss take no value",
+    "run --resume yes": "'yes' belongs to no option; .* takes one value, a flag such as --resume none",
     "run --movements 1e3": "--movements must be a whole number, got '1e3'",
     "run --movements": "--movements needs a value",
     "run --seed 1_0": "--seed must be a whole number, got '1_0'",  # int() of Python would read 10

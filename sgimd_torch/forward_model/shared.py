@@ -41,11 +41,11 @@ class SharedModel(Trained):
         """Result of `ForwardModel.refresh`."""
         return self.model.refresh(memory)
 
-    def listener(self, life: RunLoop) -> ModelListener:
+    def listener(self, loop: RunLoop) -> ModelListener:
         """Listener that refreshes the model in a run."""
-        learner = life.parts.learner
+        learner = loop.parts.learner
         asked = partial(uses_model, learner.inverse, self.model)
-        return ModelListener(life.record, self.model, asked, learner.memory, life.seconds)
+        return ModelListener(loop.record, self.model, asked, learner.memory, loop.seconds)
 
 
 @with_keywords_of(ForwardModel, "members", "rate", "noise_heads", "accelerator", "trust")

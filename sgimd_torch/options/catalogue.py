@@ -33,7 +33,7 @@ goals        rivals.alp_gmm             alp-gmm=AlpGmm
 goals        goals.uniform              uniform=UniformGoals
 goals        goals.within_reach         within-reach=WithinReach
 goals        asking.interest            strategic=StrategicInterest
-progress     goals.regions              gained=gained_progress absolute=absolute_progress paired=paired_progress
+progress     goals.regions              gained=gained_progress absolute=absolute_progress
 search       searches.simplex           nelder-mead=NelderMead
 search       searches.perturb           perturb=Perturb vary=Vary
 search       rivals.cma_es              cma-es=CmaEs

@@ -64,7 +64,7 @@ def _read(argv: Sequence[str]) -> tuple[dict[str, str], set[str]]:
         if word in ("-h", "--help"):
             flags.add("help")
         elif not word.startswith("--"):
-            known = f"; --{', --'.join(map(dashed, FLAGS))} take no value"
+            known = f", a flag such as --{dashed(next(iter(FLAGS)))} none"
             raise ValueError(f"{word!r} belongs to no option; an option begins with -- and takes one value{known}")
         elif name in FLAGS and equals:
             raise ValueError(f"{word} takes no value, got {text!r}")

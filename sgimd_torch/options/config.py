@@ -12,7 +12,7 @@ import importlib.util
 import json
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, Final, NamedTuple, Self
@@ -21,6 +21,7 @@ from sgimd_torch.options.catalogue import ROD, TAUGHT_BY, WORDS, did_you_mean, l
 from sgimd_torch.options.signature import Option, as_text, options_of, parameters_of, parsed
 
 OWN: Final = "own"  # name of the run's own inverse model
+FILES: Final = ("benchmark", "demonstrations", "begin_with")  # options that name a file
 OF_TEACHING: Final = ("demonstrations", "teacher", "teachers", "social")  # options of taught algorithms
 LEAST: Final = {"seed": 0, "movements": 1, "repeats": 0, "failures": 1, "at_once": 1, "evaluate_at": 1, "floor_at": 1}
 """Least value of an option, or of each of its numbers."""
@@ -138,6 +139,11 @@ class Config:
         """How the learner is taught: by "teachers" (it asks them), by a "teacher" (who is not asked), or "" (alone)."""
         return teaching(self.values)
 
+    @property
+    def asked(self) -> tuple[str, ...]:
+        """Names of the teachers whom the learner asks."""
+        return (self.teachers or ("all",)) if self.teaching == "teachers" else ()
+
     def constructor(self, name: str) -> Callable[..., Any]:
         """The constructor of a part, with its options and the constructors of the parts that it chooses."""
         part = self.chosen[name]
@@ -146,6 +152,11 @@ class Config:
             for option in part.options
         }
         return partial(part.make, **keywords)
+
+    def with_found(self, found: Mapping[str, Any]) -> Self:
+        """These settings, with options that the robot ``found`` by movements, such as the corners of T."""
+        options = {f"environment.{name}": value for name, value in found.items() if f"environment.{name}" in self}
+        return replace(self, parts={**dict(self.parts), **options})
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -222,7 +233,6 @@ RUN: Final = options_of(Config)
 """Options of every run."""
 FLAGS: Final = {
     "resume": "flag: go on with a stopped or killed run, or lengthen a finished one.",
-    "accept_loss": "flag, with --resume: go on from the damage in a damaged record; a copy of the file is kept.",
 }
 
 

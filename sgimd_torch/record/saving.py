@@ -56,7 +56,7 @@ def load_life(
     Raises:
         ReplayError: this learner makes another movement. It has then lived a part of that life; build a new learner.
         RuntimeError: the learner has lived already.
-        RunError: there is no record at ``path``, or the record is damaged or of another robot.
+        RunError: there is no record at ``path``, or it is of another robot, or damaged; then, too, build a new learner.
     """
     for episode in repeated(learner, path, teacher=teacher):
         if after is not None:
@@ -69,9 +69,6 @@ def repeated(learner: Learner, path: str | os.PathLike[str], *, teacher: Teacher
         raise RuntimeError("load_life() needs a learner freshly built; this one has lived already")
     dims = learner.problem.dims
     with Record(path) as record:
-        damage = record.check()
-        for table in damage.keys() & {"events", "demonstrations"}:
-            raise RunError(damage[table])
         if record.dims != dims:
             raise RunError(f"{path} has dims {record.dims} of context, theta, outcome, not {dims}; another robot?")
         begun = record.about.get("begun", 0)

@@ -1,6 +1,6 @@
 """Movements of another robot, such as a simulator, that a run begins with: ``--begin-with``.
 
-memory = past_of(Path("simulated/practice/seed-000/run.sqlite"), environment)
+memory, notes, crc32 = past_of(task, Path("simulated/practice/seed-000/run.sqlite"))
 """
 
 from __future__ import annotations
@@ -13,25 +13,33 @@ from typing import Final
 import numpy as np
 
 from sgimd_torch.environments.protocol import Environment
-from sgimd_torch.files import check_regular
+from sgimd_torch.files import checksum
 from sgimd_torch.learner.events import Kind
 from sgimd_torch.memory import Memory
 from sgimd_torch.options.signature import parsed
 from sgimd_torch.record import Record, RunError
+from sgimd_torch.runs.tasks import Task
 from sgimd_torch.spaces import Array, Box, check_vector
 
 _SQLITE: Final = b"SQLite format 3"  # a record begins with it
 Exemplar = tuple[Array, Array, Array]
 
 
-def past_of(path: Path, robot: Environment) -> Memory:
+def past_of(task: Task, path: Path) -> tuple[Memory, list[str], str]:
     """The movements in a record, or in a csv file with columns ``context_0``, ``theta_0``, ``outcome_0`` and so on.
+
+    Args:
+        task: task of the run, whose robot must have the dimensions of these movements.
+        path: record or csv file.
+
+    Returns:
+        The movements, messages about them, and the checksum of the file.
 
     Raises:
         ValueError: the file is damaged or has no movements, or its robot has other dimensions, units or bounds.
         OSError: the file cannot be read.
     """
-    check_regular(path)
+    robot, crc32 = task.environment, checksum(path)
     with path.open("rb") as file:
         recorded = file.read(len(_SQLITE)) == _SQLITE
     exemplars = list(_recorded(path, robot) if recorded else _listed(path, robot))
@@ -42,7 +50,7 @@ def past_of(path: Path, robot: Environment) -> Memory:
     robot.policies.check(f"thetas of {path}", thetas)
     memory = Memory(robot.contexts.dim, robot.policies.dim, robot.outcomes.dim)
     memory.extend(contexts, thetas, check_vector(f"outcomes of {path}", outcomes, robot.outcomes.dim))
-    return memory
+    return memory, [f"begins with {len(memory)} movements of {path}, as far as they help"], crc32
 
 
 def _recorded(path: Path, robot: Environment) -> Iterator[Exemplar]:

@@ -5,7 +5,6 @@ run = read_run("runs/sgim-d/seed-003"); run.outcomes, run.evaluation["mean_error
 
 from __future__ import annotations
 
-import json
 import os
 import re
 from array import array
@@ -19,9 +18,9 @@ from numpy.typing import NDArray
 from sgimd_torch.evaluation import OwnGoals
 from sgimd_torch.files import checksum
 from sgimd_torch.learner.events import Kind
-from sgimd_torch.options.config import OWN, Config, differ
+from sgimd_torch.options.config import FILES, OWN, Config, differ
 from sgimd_torch.record import DERIVED, Record, RunError, layout
-from sgimd_torch.runs.directory import FILE, FILES, PLACE, code_of, with_found_earlier
+from sgimd_torch.runs.directory import FILE, PLACE, code_of, with_found_earlier
 from sgimd_torch.spaces import Array, Box, Demonstration
 
 Columns = dict[str, np.ndarray]
@@ -141,7 +140,7 @@ def read_run(path: str | os.PathLike[str]) -> Run:
     if not (path / FILE).exists():
         raise RunError(f"{path} holds no run; runs are in OUT/NAME/seed-000 and have a file {FILE}")
     with Record(path / FILE) as record:
-        about = {name: json.loads(value) for name, value in record.rows("about")}
+        about = record.about
         if "settings" not in about:
             raise RunError(f"{path / FILE} is a life that save_life wrote, not a run")
         settings = about["settings"]
@@ -154,8 +153,8 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         n = record.movements
     evaluated = derived["evaluations"]["movements"]
     is_empty = not demonstrations and not np.isfinite(arrays["outcomes"]).any()  # an empty memory is not evaluated
-    met = about.get("met") or [settings["movements"], None]
-    finished = n == met[0] and (settings["evaluate_at"] == [] or n in evaluated or is_empty)
+    end, expected = about["ended_early"] or (settings["movements"], None)
+    finished = n == end and (settings["evaluate_at"] == [] or n in evaluated or is_empty)
     return Run(
         path=path,
         config=settings,
@@ -169,7 +168,7 @@ def read_run(path: str | os.PathLike[str]) -> Run:
             "movements": n,
             "failed": int(arrays["failed"].sum()),
             "finished": bool(finished),
-            "expected": met[1],
+            "expected": expected,
             **about.get("seconds", {}),
         },
         **arrays,

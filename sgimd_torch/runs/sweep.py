@@ -83,7 +83,7 @@ def run_all(whole: Sequence[Config], options: argparse.Namespace, flags: Sequenc
         return 0
     with loading():
         from sgimd_torch.options.build import build  # imported here so that --help is fast
-    for config in {each.directory.parent: each for each in left}.values():
+    for config in {config.directory.parent: config for config in left}.values():
         build(config)  # wrong options raise an error before any run starts
     make_folder(out)
     failures = sweep(left, options.processes, flags=flags)
@@ -167,13 +167,13 @@ def variants_of(varied: Sequence[str], options: Sequence[str]) -> tuple[list[Con
     for option, instead in NOT_VARIED.items():
         if option in values or (option in given and option != "out"):
             raise ValueError(f"--{option} cannot be given here: {instead}")
-    found = []
+    variants = []
     for combination in itertools.product(*values.values()):
         chosen = dict(zip(values, combination, strict=True))
         config, flags = parse([*options, *(f"--{option}={value}" for option, value in chosen.items())])
         in_order = sorted(chosen, key=lambda option: (option != "algorithm", option))
-        found.append(replace(config, name=",".join(_in_name(option, chosen[option]) for option in in_order) or None))
-    return found, [f"--{dashed(flag)}" for flag, on in flags.items() if on]
+        variants.append(replace(config, name=",".join(_in_name(option, chosen[option]) for option in in_order) or None))
+    return variants, [f"--{dashed(flag)}" for flag, on in flags.items() if on]
 
 
 def _in_name(option: str, value: str) -> str:

@@ -11,7 +11,7 @@ from runs import about_of
 from sgimd_torch import MujocoRobot, SimulationError, check_environment, stream
 from sgimd_torch.demonstrations.units import moving
 from sgimd_torch.environments.controllers import Sinusoids
-from sgimd_torch.options.build import build, with_found
+from sgimd_torch.options.build import build
 from sgimd_torch.options.command_line import main, parse
 from sgimd_torch.options.config import Config
 from sgimd_torch.runs.read import config_of, finished, read_run
@@ -252,7 +252,7 @@ def test_a_run_keeps_what_was_found_and_a_resume_finds_nothing_anew(here, capsys
 
 def test_a_robot_made_by_a_function_of_the_user_has_no_options_to_keep(here):
     made_by = Config(parts={"environment": "planar-arm-7"})
-    assert with_found(made_by, MujocoRobot("arm.xml", outcome="site:tip:xy", **CORNERS)) == made_by
+    assert made_by.with_found(MujocoRobot("arm.xml", outcome="site:tip:xy", **CORNERS).found) == made_by
 
 
 @pytest.mark.parametrize(

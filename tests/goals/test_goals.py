@@ -1,12 +1,9 @@
-"""Every goal model keeps the same promises; and what the interest map's rivals without a tree do with progress."""
-
-from functools import partial
+"""Every goal model keeps the same promises; and uniform goals."""
 
 import numpy as np
 import pytest
 
 from sgimd_torch.goals.interest_map import InterestMap
-from sgimd_torch.goals.regions import paired_progress
 from sgimd_torch.goals.uniform import UniformGoals
 from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.options.catalogue import WORDS
@@ -15,15 +12,11 @@ from worlds import NO_CONTEXT, part, problem, remember
 
 LINE, SQUARE = Box.cube(0, 1, 1), Box.cube(0, 1, 2)
 
-PAIRED = {
-    "paired": partial(InterestMap, window=20, progress=paired_progress),
-}
 
-
-@pytest.fixture(params=[*WORDS["goals"], *PAIRED])
+@pytest.fixture(params=WORDS["goals"])
 def make(request):
     """Every goal model."""
-    return PAIRED.get(request.param) or part("goals", request.param)
+    return part("goals", request.param)
 
 
 def in_a_context(seed):

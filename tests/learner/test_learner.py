@@ -177,6 +177,22 @@ def test_an_interrupted_learner_forgets_what_it_asked_for_and_begins_again() -> 
     assert len(robot.memory) == 2
 
 
+def test_a_movement_made_elsewhere_enters_memory_but_counts_as_none() -> None:
+    robot, kinds = learner(Pursuit()), list[str]()
+    robot.listeners.append(lambda event: kinds.append(str(event.kind)))
+    robot.add(NO_CONTEXT, [0.5] * 4, [0.9, 0.1])
+    for theta, outcome, said in (
+        ([0.5, 0.5, 0.5, 1.5], [0.9, 0.1], "theta must lie in its box"),
+        ([0.5] * 4, [0.9, np.nan], "outcome"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            robot.add(NO_CONTEXT, theta, outcome)
+    robot.ask(NO_CONTEXT)
+    with pytest.raises(RuntimeError, match=r"was tell\(\) forgotten"):
+        robot.add(NO_CONTEXT, [0.5] * 4, [0.9, 0.1])
+    assert (len(robot.memory), robot.movements, kinds) == (1, 0, ["added"])
+
+
 def test_a_demonstration_that_does_not_fit_is_refused_and_interrupts_nothing() -> None:
     pursuit = Pursuit()
     robot = learner(pursuit)
@@ -205,11 +221,6 @@ def test_a_strategy_without_any_movement_is_an_error_not_an_endless_loop() -> No
         learner(Pursuit(n=0)).ask(NO_CONTEXT)
 
 
-def test_there_is_no_context_to_keep_while_nothing_is_under_way() -> None:
-    with pytest.raises(RuntimeError, match="idle"):
-        _ = sagg_riac(PlanarArm(4), 0).context
-
-
 def test_what_callers_hand_in_may_change_afterwards() -> None:
     pursuit = Pursuit(n=2, context_dim=1)
     robot = learner(pursuit)
@@ -219,7 +230,7 @@ def test_what_callers_hand_in_may_change_afterwards() -> None:
     for array in (context, outcome, shown):
         array[:] = 9.0
     assert pursuit.contexts == [np.array([0.1])]
-    assert robot.context.tolist() == [0.1]
+    assert robot.context_at(0).tolist() == [0.1]
     assert robot.memory.outcomes.tolist() == [[0.2, 0.3]]
     robot.watch(lesson)
     move = robot.ask([0.1])
@@ -229,7 +240,7 @@ def test_what_callers_hand_in_may_change_afterwards() -> None:
 def test_what_the_learner_hands_out_is_read_only() -> None:
     robot = learner(Pursuit(context_dim=1))
     move = robot.ask([0.1])
-    for array in (move.theta, robot.context):
+    for array in (move.theta, robot.context_at(0)):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 9.0
 

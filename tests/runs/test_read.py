@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from runs import edit, settle
+from runs import edit, write_about
 from sgimd_torch.algorithms.paper import random_exploration
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.learner.events import Event, Kind
@@ -105,12 +105,12 @@ def test_what_is_no_run_is_refused(tmp_path, run):
         find_runs(tmp_path / "csv")
     with pytest.raises(RunError, match="does not exist"):
         find_runs(tmp_path / "nowhere")
-    settle(run, settings={**read_run(run).config, "algorithm": "gone"})
+    write_about(run, settings={**read_run(run).config, "algorithm": "gone"})
     with pytest.raises(RunError, match="do not describe a run of this version"):
         config_of(read_run(run))
 
 
-@pytest.mark.parametrize("table", ["about", "events", "goals", "errors", "seals"])
+@pytest.mark.parametrize("table", ["about", "events", "goals", "errors"])
 def test_a_damaged_run_is_refused_whichever_table_it_is(run, table):
     edit(run / FILE, f"DELETE FROM {table} WHERE rowid = 2")
     with pytest.raises(RunError, match=r"run\.sqlite.*was it damaged or edited"):

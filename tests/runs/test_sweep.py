@@ -64,10 +64,10 @@ def test_options_are_crossed_and_each_combination_has_its_name():
 
 
 def test_values_and_further_options_become_those_of_the_runs():
-    (few, many), flags = variants_of(["floor-at=[],[20,40]"], ["--movements", "60", "--accept_loss"])
+    (few, many), flags = variants_of(["floor-at=[],[20,40]"], ["--movements", "60", "--resume"])
     assert (few.floor_at, many.floor_at) == ((), (20, 40))
     assert few.movements == many.movements == 60
-    assert flags == ["--accept-loss"]
+    assert flags == ["--resume"]
 
 
 def test_seeds_are_one_or_a_range_or_a_list(tmp_path, monkeypatch, capsys):

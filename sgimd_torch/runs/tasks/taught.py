@@ -5,20 +5,17 @@ demonstrations, notes, crc32 = demonstrations_of(task, file); translate = corres
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.demonstrations.fit import misfit_of
 from sgimd_torch.environments.protocol import Translating, primitive_of
 from sgimd_torch.files import checksum
 from sgimd_torch.learner import Correspondence
-from sgimd_torch.options.catalogue import function_of, load_word
-from sgimd_torch.options.config import Config
-from sgimd_torch.parts import Demonstrator, Teacher
 from sgimd_torch.runs.tasks import Task
-from sgimd_torch.spaces import Array, Demonstration, stream
+from sgimd_torch.spaces import Array, Demonstration
 
 FASTER: Final = 3.0  # ratio of durations, shortest movement to recording; a larger ratio means times in a wrong unit
 TOO_FAR: Final = 0.25  # share of a joint's range; a recording with a larger misfit is refused
@@ -60,32 +57,6 @@ def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstra
         more = f", as do {len(outside) - 1} more" if len(outside) > 1 else ""
         notes.append(f"recording {outside[0]} lands outside T{more}; were they not recorded in {unit}?")
     return demonstrations, notes, crc32
-
-
-def teachers_of(
-    config: Config, task: Task, notes: list[str]
-) -> tuple[Teacher | None, dict[str, Demonstrator], str | None]:
-    """Teacher who is not asked, teachers who are, by name, and the checksum of their demonstrations (None: no file).
-
-    ``notes`` gets messages about the demonstrations, which are read if a teacher needs them.
-    """
-    asked = (config.teachers or ("all",)) if config.teaching == "teachers" else ()
-    makers = {f"teacher {word}": load_word("teachers", word) for word in asked}
-    makers |= {} if asked else {"teacher": config.constructor("teacher")}
-    demonstrations: Sequence[Demonstration] = []
-    crc32 = None
-    if any(map(_needs_demonstrations, makers.values())):
-        demonstrations, about_them, crc32 = demonstrations_of(task, config.demonstrations)
-        notes += about_them
-    given = {name: (make, demonstrations, stream(config.seed, name)) for name, make in makers.items()}
-    if not asked:
-        return Teacher.of(*given["teacher"]), {}, crc32
-    return None, {word: Demonstrator.of(*given[f"teacher {word}"]) for word in asked}, crc32
-
-
-def _needs_demonstrations(make: Callable[..., Any]) -> bool:
-    kind = function_of(make)
-    return not (isinstance(kind, type) and issubclass(kind, Teacher)) or kind.needs_demonstrations
 
 
 def correspondence_of(task: Task) -> Correspondence:
