@@ -72,7 +72,7 @@ def build(config: Config) -> RunParts:
     """
     task = task_of(config)
     robot, readers = task.environment, dict[str, Callable[..., Any]](benchmark=benchmark_of)
-    config = config.with_found(robot.found if isinstance(robot, FromFiles) else {})
+    config = config.with_found(robot.found_options if isinstance(robot, FromFiles) else {})
     check_at_once(robot, config.at_once)
     own = [config.constructor("teacher")] if config.teaching == "teacher" else []
     asked = {word: load_word("teachers", word) for word in config.asked}

@@ -223,7 +223,7 @@ class Config:
         if name.partition(".")[0] in OF_TEACHING and not self.teaching:
             why = f"learns alone; taught are {', '.join(TAUGHT_BY)}"
         else:
-            known = sorted({*self.defaults, *FLAGS} - {name})
+            known = sorted(self.defaults.keys() - {name})
             near = did_you_mean(name, [option for option in known if option.rpartition(".")[0] == owner], 2)
             why = f"has no such option{dashed(near)}"
         return ValueError(f"--{dashed(name)}: {part.kind} {part.word} {why}")
@@ -231,9 +231,6 @@ class Config:
 
 RUN: Final = options_of(Config)
 """Options of every run."""
-FLAGS: Final = {
-    "resume": "flag: go on with a stopped or killed run, or lengthen a finished one.",
-}
 
 
 class Part(NamedTuple):
