@@ -34,6 +34,7 @@ from sgimd_torch.runs.signals import command
 from sgimd_torch.runs.tasks import benchmark_of
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Array, stream
+from suite import TASKS
 
 AFTER: Final = (100, 250, 500, 1000)  # movements after the change at which a learner is evaluated
 BEGUN: Final = (50, *AFTER)  # movements after a simulator
@@ -92,7 +93,8 @@ def life(name: str, change: str, learner: str, seed: int) -> dict[int, tuple[flo
     """Errors by number of movements after the change, and how many changes the learner has noticed by then."""
     if change == SIMULATOR:
         return life_after_simulator(learner, seed)
-    made, anew = load_word("environment", name)(), learner == ANEW
+    place = TASKS[name].options["environment"] if name in TASKS else name
+    made, anew = load_word("environment", place)(), learner == ANEW
     goals = benchmark_of(made, None)[0].goals
     at = 0 if anew else ROBOTS[name]
     world = Changing(made.environment, "none" if anew and change == "undone" else change, at)
@@ -125,15 +127,15 @@ def errors(
     learner: Learner, world: Environment, seed: int, goals: Array, start: int, counts: Collection[int]
 ) -> dict[int, tuple[float, int]]:
     """Mean error at the goals (unit of T), and changes noticed, by number of movements after the first ``start``."""
-    found = {}
+    errors_at = {}
     for episode in run(learner, world, seed, movements=start + max(counts)):
         made = episode.index + 1
         if isinstance(world, Changing):
             world.made = made
         if made - start in counts:
             evaluation = evaluate(learner.inverse, world, goals, 1, step=made, repeats=0)
-            found[made - start] = evaluation.mean_error, len(learner.changes)
-    return found
+            errors_at[made - start] = evaluation.mean_error, len(learner.changes)
+    return errors_at
 
 
 def after(robot: str) -> tuple[int, ...]:

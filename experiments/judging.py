@@ -8,12 +8,12 @@ claims are open. Verdicts on several claims, such as all claims of a page, are c
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import cache, partial
 from typing import Final, NamedTuple
 
 from evidence import Level, NotRun, Statistic
-from sgimd_torch.views.statistics import LEVEL, holm, show
+from sgimd_torch.views.statistics import LEVEL, show
 
 HOLDS: Final = "holds"
 FAILS: Final = "fails"
@@ -89,6 +89,29 @@ def judge(claims: Sequence[Claim]) -> list[Verdict]:
     ]
 
 
+def holm(claims: Iterable[int], rejects: Callable[[int, float], bool]) -> set[int]:
+    """The claims that are accepted jointly: the probability that any accepted claim is wrong is at most 5 %.
+
+    Holm's method (1979) with intervals: all claims are tested at Bonferroni's level for their number. Accepted claims
+    are set aside, and the remaining claims are tested again at the level for their own number.
+
+    Args:
+        claims: numbers of all claims that were considered, also those without a chance.
+        rejects: function of a claim's number and a confidence level; true if the interval at this level decides the
+            claim.
+    """
+    left = list(dict.fromkeys(claims))
+    standing: set[int] = set()
+    while left:
+        level = 1 - (1 - LEVEL) / len(left)
+        decided = {claim for claim in left if rejects(claim, level)}
+        if not decided:
+            break
+        standing |= decided
+        left = [claim for claim in left if claim not in decided]
+    return standing
+
+
 def at_most(
     bar: float, statistic: Statistic, *of: object, margin: float = 0.0, name: str = "", form: str = ".2f"
 ) -> Part:
@@ -106,7 +129,7 @@ def at_least(
 @cache
 def _above(part: Part, level: Level) -> tuple[float, float, float]:
     """Number, low and high end of a part, as distances from its bar; a distance above 0 is on the wrong side."""
-    value, low, high = (each - part.bar for each in part.measured(level=level))
+    value, low, high = (end - part.bar for end in part.measured(level=level))
     return (-value, -high, -low) if part.least else (value, low, high)
 
 

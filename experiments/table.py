@@ -110,9 +110,9 @@ def result_rows(config: Config, run: Run) -> list[Row]:
     """
     rows: list[Row] = []
     key = {"variant": config.variant, "seed": config.seed, "task": task_name(config)}
-    for answer, found in run.answers.items():
-        name = own_answer(config) if answer == OWN else answer
-        evaluations = (found[column].tolist() for column in ("movements", "mean_error", "noise_floor"))
+    for inverse, evaluation in run.evaluations.items():
+        name = own_answer(config) if inverse == OWN else inverse
+        evaluations = (evaluation[column].tolist() for column in ("movements", "mean_error", "noise_floor"))
         for movements, error, floor in zip(*evaluations, strict=True):
             rows.append({**key, "movements": movements, "answer": name, "error": error, "floor": floor})
     return rows
@@ -133,7 +133,9 @@ def task_name(config: Config) -> str:
     usual = Config.from_settings({"environment": config["environment"]}).values
     options = {name.removeprefix("environment."): value for name, value in config.values.items()
                if name.startswith("environment.") and value != usual[name]}  # fmt: skip
-    return " ".join([config["environment"], *(f"{name}={value:g}" for name, value in options.items())])
+    place, _, name = config["environment"].rpartition(":")
+    robot = name.replace("_", "-") if place else name
+    return " ".join([robot, *(f"{name}={value:g}" for name, value in options.items())])
 
 
 def explored_rows(config: Config, run: Run) -> list[Row]:
@@ -176,7 +178,7 @@ def asked_rows(config: Config, run: Run) -> list[Row]:
     teachers = config.teachers or ("all",)
     counts = counted.groupby(asked["teacher"]).sum().reindex(teachers, fill_value=0).astype(int)
     key = {"variant": config.variant, "seed": config.seed}
-    return [{**key, "teacher": teacher, **row} for teacher, row in counts.to_dict("index").items()]
+    return [{**key, "teacher": word.rpartition(":")[2], **row} for word, row in counts.to_dict("index").items()]
 
 
 ROWS: Final = {"explored.csv": explored_rows, "asked.csv": asked_rows}

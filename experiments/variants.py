@@ -15,7 +15,7 @@ import numpy as np
 
 from sgimd_torch.demonstrations import SHIPPED, load_demonstrations, save_demonstrations
 from sgimd_torch.files import make_folder
-from sgimd_torch.views.suite import REFERENCES, TASKS, UNIFORM
+from suite import REFERENCES, TASKS, UNIFORM
 
 Variant = dict[str, Any]
 ARMS: Final = ("planar-arm-7", "planar-arm-50")
@@ -83,7 +83,9 @@ MODEL: Final[dict[str, Variant]] = {
 # Learners that ask.
 IM: Final[Variant] = {"algorithm": "sgim-im"}
 ACTS: Final[Variant] = {"algorithm": "sgim-acts"}
-FOUR: Final = ("demonstrator-1", "demonstrator-2", "demonstrator-3", "mislabelling")
+MISLABELLING: Final = "mislabelling"  # name of this teacher in asked.csv
+RECORDED: Final = ("demonstrator-1", "demonstrator-2", "demonstrator-3")
+FOUR: Final = (*RECORDED, MISLABELLING)
 HALVES: Final = ("low-half", "high-half")
 
 
@@ -113,10 +115,10 @@ def _on_tasks(learners: dict[str, Variant], tasks: Iterable[str]) -> dict[str, V
 
 def _ladder(ending: str, where: Variant) -> dict[str, Variant]:
     """The steps between the letter of the paper, ``sgim-d-letter``, and our defaults, ``sgim-d``."""
-    found, line = {}, {**SGIM_D, **LETTER, **where, **END}
+    ladder, line = {}, {**SGIM_D, **LETTER, **where, **END}
     for number, (step, _, becomes) in enumerate(STEPS[:-1], 1):
-        found[f"ladder-{number}-{step}{ending}"] = line = {**line, **becomes}
-    return found
+        ladder[f"ladder-{number}-{step}{ending}"] = line = {**line, **becomes}
+    return ladder
 
 
 EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
@@ -208,13 +210,12 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
                 "sgim-im-83": {**IM, "demonstrations": MANY},
                 "sgim-im-cost-10": {**IM, "cost": 10.0},
                 **{f"sgim-acts-{number}": {**ACTS, "teachers": (f"demonstrator-{number}",)} for number in (1, 2)},
-                "sgim-acts-four": {**ACTS, "teachers": FOUR},
+                "sgim-acts-four": {**ACTS, "teachers": (*RECORDED, f"experiments.mislabelling:{MISLABELLING}")},
                 "sgim-acts-halves": {**ACTS, "teachers": HALVES},
-                "sgim-eer": {"algorithm": "sgim-eer"},
             }.items()
         },
         "sgim-im.toss": {**IM, **TASKS["toss"].options, **SHORT},
-        "practice.toss-blind": {**PRACTICE, "environment": "experiments.parts:blind_toss", **SHORT},
+        "practice.toss-blind": {**PRACTICE, "environment": "experiments.toys:blind_toss", **SHORT},
     },
 }
 VARIANTS: Final = {name: line for variants in EXPERIMENTS.values() for name, line in variants.items()}
@@ -234,7 +235,7 @@ def make_subsets(folder: Path) -> None:
         OSError: a file cannot be written.
     """
     everything = load_demonstrations()
-    outcomes = np.array([each.outcome for each in everything])
+    outcomes = np.array([demonstration.outcome for demonstration in everything])
     corner = np.linalg.norm(outcomes - outcomes.max(axis=0), axis=1).argsort()[:20]
     make_folder(folder)
     save_demonstrations(folder / CORNER, [everything[k] for k in corner])

@@ -3,12 +3,11 @@
 A mutant is the library with one fault: a sign, a factor, a bound, an order. A mutant dies if one of its tests fails;
 if all pass, it survives, and a test is missing. Each mutant is tried with the test files that ought to find it, without
 the tests marked slow; at the end, the tests that failed are carried out without a mutant. The working tree does not
-change. All mutants together take about 15 minutes on an idle core.
+change. All mutants take about 10 minutes of processor time.
 
-    python scripts/mutants.py                        # all mutants
+    python scripts/mutants.py                        # all mutants; with --list, only their numbers and names
     python scripts/mutants.py 7 12 simplex           # numbers 7 and 12, and all whose names contain "simplex"
     python scripts/mutants.py --commit HEAD~3        # the code of a commit, in place of the working tree
-    python scripts/mutants.py --list                 # numbers, names and places; nothing runs
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ import subprocess
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Final, NamedTuple
+from typing import Final
 
 from tqdm import tqdm
 
@@ -37,9 +36,9 @@ eq. (3): progress is twice as large | goals/regions.py | goals/test_regions.py
     / (2 * half)) ==> / half)
 interest by the oldest goals of a region | goals/regions.py | goals/test_regions.py
     competences[-window:] ==> competences[:window]
-eq. (4): the least interest is not subtracted | goals/tiling.py | goals/test_interest.py
+eq. (4): the least interest is not subtracted | goals/regions.py | goals/test_interest.py
     interests - interests.min() ==> interests
-modes 1 and 2 have each other's probability | goals/tiling.py | goals/test_interest.py
+modes 1 and 2 have each other's probability | goals/regions.py | goals/test_interest.py
     (0.7, 0.2, 0.1) ==> (0.2, 0.7, 0.1)
 split one goal too early | goals/interest_map.py | goals/test_interest.py
     <= self.g_max: ==> < self.g_max:
@@ -99,6 +98,10 @@ requests: costs do not count | asking/interest.py | asking/test_interest.py
     - np.log(cost) ==> - 0 * np.log(cost)
 record: the outcome in the columns of the goal | record/layout.py | record/test_record.py
     *_cells(event.goal, t), ==> *_cells(event.outcome, t),
+record: NaN is kept as a number | record/layout.py | record/test_record.py
+    (None if value != value else ==> (value if value != value else
+record: the last rows come first | record/__init__.py | record/test_record.py
+    ORDER BY rowid LIMIT ==> ORDER BY -rowid LIMIT
 replay: another theta is accepted | record/replay.py | learner/test_life.py
     if not box.same(recorded, now): ==> if now is recorded:
 replay: another demonstration is accepted | record/replay.py | learner/test_life.py
@@ -112,41 +115,31 @@ at once: attempts are replayed out of order | learner/__init__.py | learner/test
 """
 
 
-class Mutant(NamedTuple):
-    """A fault: its name, the file, the tests that ought to find it, the right text and the wrong one."""
-
-    name: str
-    file: str
-    tests: list[str]
-    right: str
-    wrong: str
+def mutants() -> dict[int, list[str]]:
+    """Name, file, tests, right text and wrong text of each mutant, by number."""
+    lines = MUTANTS.strip().splitlines()
+    pairs = zip(lines[::2], lines[1::2], strict=True)
+    return {n: [*head.split(" | "), *change.strip().split(" ==> ")] for n, (head, change) in enumerate(pairs, start=1)}
 
 
-def mutants() -> dict[int, Mutant]:
-    """All mutants by number."""
-    lines, made = MUTANTS.strip().splitlines(), dict[int, Mutant]()
-    for head, change in zip(lines[::2], lines[1::2], strict=True):
-        (name, file, tests), (right, wrong) = head.split(" | "), change.strip().split(" ==> ")
-        paths = [f"tests/{test}" for test in tests.split()]
-        made[1 + len(made)] = Mutant(name, f"sgimd_torch/{file}", paths, right, wrong)
-    return made
+def meant(word: str, every: dict[int, list[str]]) -> list[int]:
+    """Numbers of the mutants that a word means, a number or a part of names."""
+    return [n for n, (name, *_) in every.items() if (word == str(n) if word.isdecimal() else word in name)]
 
 
-def copy_to(folder: Path, commit: str | None) -> None:
-    """Copy the files of a commit to ``folder``, or those of the working tree."""
+def copy_to(folder: Path, commit: str | None) -> bool:
+    """Copy the files of a commit to ``folder``, or those of the working tree that git tracks; False: no such commit."""
     git = ["git", "-C", str(HERE)]
-    if commit is None:  # a commit of the working tree, which no branch has; nothing if there is no change
-        stashed = subprocess.run([*git, "stash", "create"], stdout=subprocess.PIPE, text=True, check=True)
-        commit = stashed.stdout.strip() or "HEAD"
-    packed = subprocess.run([*git, "archive", commit], stdout=subprocess.PIPE, check=True).stdout
-    subprocess.run(["tar", "-x", "-C", str(folder)], input=packed, check=True)
+    if commit is None:  # "stash create" makes a commit of the working tree that no branch has; nothing without a change
+        commit = subprocess.run([*git, "stash", "create"], capture_output=True, text=True).stdout.strip() or "HEAD"
+    packed = subprocess.run([*git, "archive", commit], stdout=subprocess.PIPE)
+    return not packed.returncode and not subprocess.run(["tar", "-xC", str(folder)], input=packed.stdout).returncode
 
 
 def failing(folder: Path, tests: list[str], compiled: str) -> str | None:
     """The first test that fails, as a word for pytest; "" if all pass; None if they cannot be carried out.
 
-    ``compiled`` is the name of the folder for numba. It is new for a mutant of compiled code, because numba does not
-    see a change in what a function calls.
+    ``compiled`` is the name of numba's folder, a new one for a mutant of compiled code: numba would not see the change.
     """
     words = [sys.executable, "-m", "pytest", "-x", "-m", "not slow", "--tb=no", "-rfE", "-p", "no:cacheprovider"]
     variables = {"PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1", "NUMBA_CACHE_DIR": str(folder / compiled)}
@@ -159,14 +152,15 @@ def failing(folder: Path, tests: list[str], compiled: str) -> str | None:
     return {0: "", 1: failed and failed[1]}.get(done.returncode)
 
 
-def found_by(folder: Path, number: int, mutant: Mutant) -> str | None:
+def found_by(folder: Path, number: int, file: str, tests: str, right: str, wrong: str) -> str | None:
     """The test that finds a mutant; "" if it survives; None if it cannot be tried."""
-    path = folder / mutant.file
+    path = folder / "sgimd_torch" / file
     source = path.read_text(encoding="utf-8") if path.exists() else ""
-    if source.count(mutant.right) != 1:
+    if source.count(right) != 1:
         return None
-    path.write_text(source.replace(mutant.right, mutant.wrong), encoding="utf-8")
-    test = failing(folder, mutant.tests, f"compiled-{number}" if "numba" in source else "compiled")
+    path.write_text(source.replace(right, wrong), encoding="utf-8")
+    paths = [f"tests/{test}" for test in tests.split()]
+    test = failing(folder, paths, f"compiled-{number}" if "numba" in source else "compiled")
     path.write_text(source, encoding="utf-8")
     return test
 
@@ -176,27 +170,24 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("which", nargs="*", metavar="MUTANT", help="number, or part of a name (default: all)")
     parser.add_argument("--commit", help="commit whose code and tests are tried (default: the working tree)")
-    parser.add_argument("--list", action="store_true", help="print the mutants and end")
+    parser.add_argument("--list", action="store_true", help="print the mutants, and end")
     options, every = parser.parse_args(), mutants()
-    words = options.which or [""]
-    wanted = [
-        n
-        for n, mutant in every.items()
-        if any(word == str(n) if word.isdecimal() else word in mutant.name for word in words)
-    ]
-    if not wanted:
-        parser.error(f"no mutant has a number or a name like {' '.join(words)}; --list prints numbers and names")
+    wanted = [number for word in options.which or [""] for number in meant(word, every) or [word]]
+    for word in (word for word in wanted if word not in every):
+        parser.error(f"{word} is no number from 1 to {len(every)} and in no name; --list prints numbers and names")
     if options.list:
-        print(*(f"{number:3} {every[number].name} ({every[number].file})" for number in wanted), sep="\n")
+        print(*(f"{number:3} {every[number][0]} ({every[number][1]})" for number in wanted), sep="\n")
         return 0
-    with TemporaryDirectory() as name:
-        folder = Path(name)
-        copy_to(folder, options.commit)
+    with TemporaryDirectory() as place:
+        folder = Path(place)
+        if not copy_to(folder, options.commit):
+            parser.error(f"--commit must be a commit of this repository, got {options.commit}")
         results = dict[int, str | None]()
         for number in tqdm(wanted, disable=None):
-            results[number] = test = found_by(folder, number, every[number])
+            name, *rest = every[number]
+            results[number] = test = found_by(folder, number, *rest)
             fate = "cannot be tried" if test is None else f"died: {test}" if test else "SURVIVED"
-            tqdm.write(f"{number:3} {every[number].name:56} {fate}")
+            tqdm.write(f"{number:3} {name:56} {fate}")
         killers = sorted({test for test in results.values() if test})
         wrong = failing(folder, killers, "compiled") if killers else ""
     print(f"{len(killers)} tests have found {sum(map(bool, results.values()))} of {len(results)} mutants")

@@ -21,7 +21,6 @@ from .evaluation import evaluate as evaluate
 from .evaluation import load_benchmark as load_benchmark
 from .evaluation import save_benchmark as save_benchmark
 from .goals.interest_map import InterestMap as InterestMap
-from .goals.progress_grid import ProgressGrid as ProgressGrid
 from .goals.uniform import UniformGoals as UniformGoals
 from .inverses.local import LocalInverse as LocalInverse
 from .inverses.locally_linear import LocallyLinear as LocallyLinear

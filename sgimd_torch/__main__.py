@@ -9,9 +9,14 @@ from collections.abc import Sequence
 from typing import Final
 
 from sgimd_torch import __version__
-from sgimd_torch.options.catalogue import EXTRAS, WORDS, about, unknown
+from sgimd_torch.options.catalogue import WORDS, about, unknown
 from sgimd_torch.runs.signals import command, loading
 
+EXTRAS: Final = {
+    **dict.fromkeys(("demonstrations", "demo"), "plot"),
+    **{name: name for name in ("report", "teach", "film")},
+}
+"""The extra of the package that each of these commands needs."""
 HELP: Final = f"""usage: sgimd COMMAND [OPTIONS]
 
 Robots learn movements for goals by curiosity and by imitating a teacher

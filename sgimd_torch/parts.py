@@ -115,7 +115,7 @@ class Trained(ABC):
 
 
 class Goals(Part):
-    """Goal model: chooses goals by the results of earlier goals (section 3.2). `goals.checks` has argument checks."""
+    """Goal model: chooses goals by the results of earlier goals (section 3.2). `goals.uniform` has argument checks."""
 
     draws_from = "goals"
 

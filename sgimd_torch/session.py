@@ -123,42 +123,42 @@ def run(
         )
     execute = live(environment, seed) if execute is None else execute
     before: dict[int, BeforeMovement] = {}
-    with ExitStack() as until_the_end:
+    with ExitStack() as at_the_end:
         if record is not None:
             events = record.events()
-            if (recorded := next(events, None)) is not None:
-                from sgimd_torch.record.replay import replay  # most programs have no record to replay
+            if (first_event := next(events, None)) is not None:
+                from sgimd_torch.record.replay import replay  # a new life has nothing to replay
 
-                before = yield from replay(learner, chain([recorded], events), teacher=teacher)
+                before = yield from replay(learner, chain([first_event], events), teacher=teacher)
             learner.listeners.append(record.add)
-            until_the_end.callback(learner.listeners.remove, record.add)
-        in_a_row: list[Failure] = []
+            at_the_end.callback(learner.listeners.remove, record.add)
+        failed_in_a_row: list[Failure] = []
         while (first := learner.movements) < movements:
             contexts: list[Array | Failure] = []
             for place in range(min(at_once, max(1, first // JOINS_EVERY), movements - first)):
                 index = first + place
-                caused = _offered(learner, teacher, index, place, before.get(place, BeforeMovement()))
+                preceding = _offered(learner, teacher, index, place, before.get(place, BeforeMovement()))
                 context = _observed(learner, environment, index, place, seed)
-                if teachers and caused.request is None and not isinstance(context, Failure):
-                    caused = _asked(learner, environment, context, place, teachers, caused)
-                before[place] = caused
+                if teachers and preceding.request is None and not isinstance(context, Failure):
+                    preceding = _asked(learner, environment, context, place, teachers, preceding)
+                before[place] = preceding
                 contexts.append(context)
             moves = learner.ask_many(contexts)
             outcomes = _executed(execute, first, contexts, moves)
             learner.tell_many(outcomes)
             for place, (context, move, outcome) in enumerate(zip(contexts, moves, outcomes, strict=True)):
                 seen = np.full(environment.contexts.dim, np.nan) if isinstance(context, Failure) else context
-                caused = before.pop(place)
+                preceding = before.pop(place)
                 if isinstance(outcome, Failure):
-                    in_a_row.append(outcome)
-                    yield Episode(first + place, seen, move, None, *caused, outcome.reason)
+                    failed_in_a_row.append(outcome)
+                    yield Episode(first + place, seen, move, None, *preceding, outcome.reason)
                 else:
                     if move is not None:
-                        in_a_row.clear()
-                    yield Episode(first + place, seen, move, outcome, *caused)
-            if len(in_a_row) >= failures:
-                last = in_a_row[-1]
-                reason = f"{len(in_a_row)} movements in a row failed, the last one: {last.reason}"
+                        failed_in_a_row.clear()
+                    yield Episode(first + place, seen, move, outcome, *preceding)
+            if len(failed_in_a_row) >= failures:
+                last = failed_in_a_row[-1]
+                reason = f"{len(failed_in_a_row)} movements in a row failed, the last one: {last.reason}"
                 raise NoOutcomeError(reason) from last.cause
 
 
@@ -195,19 +195,19 @@ def _asked(
     request = learner.request(context, place=place)
     if request is None:
         return before
-    answer, reply = _answer(learner, environment, context, request, teachers)
-    if answer is None:
+    demonstration, reply = _reply(learner, environment, context, request, teachers)
+    if demonstration is None:
         learner.go_on_alone(reply, place=place)
         return before._replace(request=request, reply=reply)
-    learner.watch(answer, place=place)
-    return BeforeMovement(answer, request, reply)
+    learner.watch(demonstration, place=place)
+    return BeforeMovement(demonstration, request, reply)
 
 
 def _executed(
     execute: Execute, first: int, contexts: Sequence[Array | Failure], moves: Sequence[Move | None]
 ) -> list[Array | Failure | None]:
     """For each robot its outcome, or why it has none; None: it rests. The first robot makes movement ``first``."""
-    outcomes: list[Array | Failure | None] = [each if isinstance(each, Failure) else None for each in contexts]
+    outcomes: list[Array | Failure | None] = [context if isinstance(context, Failure) else None for context in contexts]
     moving = [(first + k, contexts[k], move.theta) for k, move in enumerate(moves) if move is not None]
     if moving:
         for (index, *_), outcome in zip(moving, execute(*zip(*moving, strict=True)), strict=True):
@@ -230,7 +230,7 @@ def reason_of(error: BaseException) -> str:
     return "".join(sign if sign.isprintable() else " " for sign in said)[:300].strip()
 
 
-def _answer(
+def _reply(
     learner: Learner, environment: Environment, context: Array, request: Request, teachers: Mapping[str, Demonstrator]
 ) -> tuple[Demonstration | None, str]:
     """The demonstration that replies to a request (None: there is no new and usable one), and ``Episode.reply``.
@@ -241,12 +241,12 @@ def _answer(
     if name not in teachers:
         raise ValueError(f"the learner asks {name!r}, but teachers are {', '.join(teachers)}; are they its teachers?")
     try:
-        shown = teachers[name].demonstrate(context.copy(), request.goal, learner.memory)
-        if shown is None:
+        demonstration = teachers[name].demonstrate(context.copy(), request.goal, learner.memory)
+        if demonstration is None:
             return None, "nothing"
-        environment.contexts.check("context of the demonstration", shown.context)
-        environment.outcomes.check("outcome of the demonstration", shown.outcome)
-        return (None, "again") if learner.was_shown(shown) else (shown, "shown")
+        environment.contexts.check("context of the demonstration", demonstration.context)
+        environment.outcomes.check("outcome of the demonstration", demonstration.outcome)
+        return (None, "again") if learner.was_shown(demonstration) else (demonstration, "shown")
     except TimeoutError as error:
         said, reply = f"did not reply in time, so the learner goes on: {error}", "timed out"
     except (Exception, SystemExit) as error:  # no failure of a teacher may end the run
@@ -281,4 +281,4 @@ def _tried_together(
             raise ValueError(f"execute_many() must give {n} outcomes in rows, ({n}, {dim}), got {outcomes.shape}")
     except (Exception, SystemExit) as error:  # no failure of a robot may end the run
         return [Failure(reason_of(error), error)] * n
-    return [_tried("outcome", dim, lambda each=each: each) for each in outcomes]
+    return [_tried("outcome", dim, np.copy, outcome) for outcome in outcomes]

@@ -269,7 +269,7 @@ class Estimate(NamedTuple):
 
     ``expected`` ``(outcome_dim,)`` is the outcome that the inverse model expects of theta, and ``sd`` the standard
     deviation from it in each dimension, noise included, in the unit of T; None: the inverse model does not know.
-        estimate = learner.inverse(context, goal); estimate.expected, estimate.off, estimate.expected_error(goal)
+        estimate = learner.inverse(context, goal); estimate.expected, estimate.expected_error(goal)
     """
 
     theta: Array
@@ -280,7 +280,7 @@ class Estimate(NamedTuple):
     sd: float | None = None
 
     @property
-    def off(self) -> float:
+    def expected_deviation(self) -> float:
         """Mean distance of the outcome of theta from ``expected``, in the unit of T; NaN: unknown."""
         dim = self.outcomes.shape[1]
         chi = math.sqrt(2) * math.exp(math.lgamma((dim + 1) / 2) - math.lgamma(dim / 2))  # its mean
@@ -291,7 +291,9 @@ class Estimate(NamedTuple):
 
         It is exact if the outcome is expected at the goal, or is certain; else it is too large by at most a tenth.
         """
-        return math.nan if self.expected is None else math.hypot(math.dist(self.expected, goal), self.off)
+        return (
+            math.nan if self.expected is None else math.hypot(math.dist(self.expected, goal), self.expected_deviation)
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from sgimd_torch.competence import Competence
-from sgimd_torch.explore.anywhere import Anywhere
 from sgimd_torch.parts import Explore, Goals, Judge, Part, Problem, Search, Social, Strategy
+from sgimd_torch.searches.explore import Anywhere
 from sgimd_torch.spaces import Array, Attempt, Demonstration, Move, check_count
 
 

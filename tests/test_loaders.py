@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
-from sgimd_torch.demonstrations.columns import Columns
+from sgimd_torch.demonstrations.columns import ColumnNames
 from sgimd_torch.demonstrations.text import read_text
 from sgimd_torch.evaluation import Benchmark, load_benchmark, save_benchmark
 from sgimd_torch.files import checksum, read_npz, write_npz
@@ -147,7 +147,7 @@ def test_a_benchmark_that_cannot_be_is_refused_in_few_words(tmp_path, changes, w
 
 
 @pytest.mark.parametrize(
-    "load", [load_benchmark, load_demonstrations, checksum, lambda path: read_text(path, Columns(("a",), ("x",)))]
+    "load", [load_benchmark, load_demonstrations, checksum, lambda path: read_text(path, ColumnNames(("a",), ("x",)))]
 )
 def test_a_named_pipe_is_refused_and_keeps_nobody_waiting(tmp_path, load):
     os.mkfifo(tmp_path / "pipe")

@@ -142,11 +142,11 @@ def test_an_estimate_says_how_far_its_outcome_may_be_off_and_from_the_goal(dim):
     rng, sd = np.random.default_rng(0), 0.3
     estimate = Estimate(THETA, THETA[None], np.zeros((1, dim)), expected=np.ones(dim), sd=sd)
     outcomes = rng.normal(estimate.expected, sd, (40_000, dim))
-    assert estimate.off == pytest.approx(np.linalg.norm(outcomes - 1, axis=1).mean(), rel=0.02)
-    assert estimate.expected_error(np.ones(dim)) == estimate.off
+    assert estimate.expected_deviation == pytest.approx(np.linalg.norm(outcomes - 1, axis=1).mean(), rel=0.02)
+    assert estimate.expected_error(np.ones(dim)) == estimate.expected_deviation
     for away in (0.1, 0.3, 1.0, 10.0):
         goal = np.eye(dim)[0] * away + 1
         found = np.linalg.norm(outcomes - goal, axis=1).mean()
         assert 0.98 < estimate.expected_error(goal) / found < 1.11
     unknown = estimate._replace(expected=None, sd=None)
-    assert np.isnan([unknown.off, unknown.expected_error(np.ones(dim))]).all()
+    assert np.isnan([unknown.expected_deviation, unknown.expected_error(np.ones(dim))]).all()

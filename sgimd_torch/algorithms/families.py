@@ -1,10 +1,11 @@
-"""Two families of movements: goal babbling that knows all exemplars, and one that began around the middle of Pi.
+"""Two families of movements, the wide and the narrow one; a family is a group of movements with their variations.
 
-Our addition. Practice begins with uniform movements, which suit most robots. But each stays the centre of its own
-variations: with the fishing rod these groups never join, and the error stops falling. Movements that spread from one
-posture stay in one group (Rolf, Steil & Gienger 2010). So a second goal babbling pursues some of the goals. It is not
-told of the first one's movements, and begins around the middle of Pi. Whoever errs less gets more goals, by Thompson
-sampling (Thompson 1933) of the newest errors. Answers come from all movements.
+Our addition. Practice begins with uniform movements, which suit most robots. But each of them stays the centre of its
+own variations: with the fishing rod these groups never join, and the error stops falling. Movements that spread from
+one posture stay in one group (Rolf, Steil & Gienger 2010). So a second goal babbling, the narrow family, pursues some
+of the goals. It is not told of the movements of the wide family, and begins around the middle of Pi. The family with
+the smaller errors gets more goals, by Thompson sampling (Thompson 1933) of the newest errors. Answers come from all
+movements.
     TwoFamilies(GoalBabbling(problem, **PRACTICE), GoalBabbling(own_problem, **PRACTICE, explore=Widening))
 """
 
@@ -12,20 +13,20 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Sequence
-from typing import Any, Final
+from typing import Final
 
-from sgimd_torch.parts import Part, Strategy
+from sgimd_torch.algorithms import ThroughBabbling
 from sgimd_torch.spaces import Array, AskingAttempt
 from sgimd_torch.strategies import GoalBabbling
 
 _FIRST: Final = 100  # least number of exemplars; until then the wide family alone pursues goals
-_LEARNT, _SHARE = 150, 1 / 3  # exemplars of the narrow family from which on errors decide; its share of goals before
+_DECIDED: Final = 150  # number of exemplars of the narrow family from which on errors decide
+_SHARE: Final = 1 / 3  # share of the goals that the narrow family gets before
 _NEWEST: Final = 60  # number of movements whose errors decide
-_TINY: Final = 1e-300  # the logarithm of an error of 0 is finite
+_TINY: Final = 1e-300  # added to an error, so that the logarithm of an error of 0 is finite
 
 
-class TwoFamilies(Strategy):
+class TwoFamilies(ThroughBabbling):
     """Goal babbling in two families of movements, which share the goals of the wide family.
 
     The wide family knows all exemplars. The narrow family knows all except those of the wide one. If the learner begins
@@ -39,19 +40,10 @@ class TwoFamilies(Strategy):
     draws_from = "families"
 
     def __init__(self, wide: GoalBabbling, narrow: GoalBabbling) -> None:
-        super().__init__(wide.problem)
+        super().__init__(wide)
         self.wide, self.narrow = wide, narrow
         self._seen = 0  # number of exemplars that `_tell_narrow` has seen
         self._errors = deque[tuple[bool, float]](maxlen=_NEWEST)  # whether narrow, and log of the distance to the goal
-
-    @property
-    def regions(self) -> Sequence[Any]:
-        """Regions of the goal model of the wide family."""
-        return self.wide.regions
-
-    def maker(self, origin: str) -> Part:
-        """See `GoalBabbling.maker`."""
-        return self.wide.maker(origin)
 
     def attempt(self, context: Array) -> AskingAttempt:
         """An attempt at a goal by one family; the narrow one is told of its outcomes before it goes on."""
@@ -73,7 +65,7 @@ class TwoFamilies(Strategy):
         """Whether the narrow family pursues the next goal: it does if its drawn mean error is the smaller one."""
         if len(self.problem.memory) < _FIRST or self.problem.inverse.effects() is not None:
             return False
-        if len(self.narrow.memory) < _LEARNT:
+        if len(self.narrow.memory) < _DECIDED:
             return bool(self.rng.random() < _SHARE)
         means = []
         for family in (False, True):
@@ -81,7 +73,7 @@ class TwoFamilies(Strategy):
             if len(errors) < 2:
                 return family
             n, mean = len(errors), sum(errors) / len(errors)  # numpy takes five times as long for sixty numbers
-            means.append(self.rng.normal(mean, math.sqrt(sum((each - mean) ** 2 for each in errors) / (n - 1) / n)))
+            means.append(self.rng.normal(mean, math.sqrt(sum((error - mean) ** 2 for error in errors) / (n - 1) / n)))
         return bool(means[True] < means[False])
 
     def _tell_narrow(self, *, wide: bool = False) -> None:

@@ -16,14 +16,13 @@ from sgimd_torch.algorithms import MakeInverse
 from sgimd_torch.algorithms.families import TwoFamilies
 from sgimd_torch.changes import noticing_changes
 from sgimd_torch.environments.protocol import Environment
-from sgimd_torch.explore.returning import Returning
-from sgimd_torch.explore.widening import Widening
 from sgimd_torch.goals.within_reach import WithinReach
 from sgimd_torch.inverses.among_effects import AmongEffects
 from sgimd_torch.learner import Correspondence, Learner
 from sgimd_torch.memory import Memory
 from sgimd_torch.options.signature import with_keywords_of
 from sgimd_torch.parts import Problem, Social
+from sgimd_torch.searches.explore import Returning, Widening
 from sgimd_torch.searches.perturb import Vary
 from sgimd_torch.spaces import stream
 from sgimd_torch.strategies import GoalBabbling, Imitate
@@ -100,5 +99,5 @@ def _families(
         inverse, parts = AmongEffects, {**parts, "search": Vary}
     own = Problem(environment, int(stream(seed, "narrow family").integers(2**63)), inverse=inverse)
     narrow = GoalBabbling(own, **{**parts, "explore": Widening})
-    problem.remarks += [each for each in own.remarks if each not in problem.remarks]
+    problem.remarks += [remark for remark in own.remarks if remark not in problem.remarks]
     return TwoFamilies(wide, narrow)

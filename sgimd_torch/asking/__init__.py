@@ -1,1 +1,1 @@
-"""Learners that ask teachers for demonstrations: SGIM-IM, SGIM-ACTS, and a rival that compares entropies."""
+"""Learners that ask teachers for demonstrations: SGIM-IM and SGIM-ACTS."""

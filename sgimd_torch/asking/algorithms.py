@@ -2,7 +2,6 @@
 
 learner = sgim_acts(environment, seed, correspondence=..., teachers={"ann": ann, "ben": ben}, cost=3)
 learner = sgim_im(environment, seed, correspondence=..., teachers={"ann": ann}, **SEARCHING)     # options of the papers
-learner = sgim_im(environment, seed, correspondence=..., teachers={"ann": ann}, goals=EntropyGoals)
 """
 
 from __future__ import annotations
@@ -13,17 +12,16 @@ from typing import Any, Final
 
 from sgimd_torch.algorithms import MakeInverse
 from sgimd_torch.algorithms.practice import PRACTICE
-from sgimd_torch.asking.entropy import EntropyGoals
 from sgimd_torch.asking.interest import AUTONOMOUS, StrategicInterest
 from sgimd_torch.asking.strategy import Asking, StrategicBabbling
 from sgimd_torch.competence import AttemptCompetence
 from sgimd_torch.environments.protocol import Environment
-from sgimd_torch.explore.anywhere import Anywhere
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Correspondence, Learner
 from sgimd_torch.memory import Memory
 from sgimd_torch.options.signature import with_keywords_of
 from sgimd_torch.parts import Demonstrator, Problem
+from sgimd_torch.searches.explore import Anywhere
 from sgimd_torch.searches.simplex import NelderMead
 from sgimd_torch.strategies import Emulate, GoalBabbling, Mimic
 
@@ -82,7 +80,7 @@ def sgim_acts(
         if emulates and babbling.budget > 1:
             emulate = Emulate(problem, strategy=AUTONOMOUS)
             asking[f"emulate {teacher}"] = Asking(teacher, emulate, cost, demonstrator.takes)
-    return Learner(problem, StrategicBabbling(problem, babbling, asking), correspondence=correspondence)
+    return Learner(problem, StrategicBabbling(babbling, asking), correspondence=correspondence)
 
 
 sgim_im = partial(sgim_acts, emulates=False)
@@ -91,5 +89,3 @@ sgim_acts_search = partial(sgim_acts, **SEARCHING)
 """SGIM-ACTS, as published: a search at each goal instead of practice."""
 sgim_im_search = partial(sgim_im, **SEARCHING)
 """SGIM-IM, as published: a search at each goal instead of practice."""
-sgim_eer = partial(sgim_im, goals=EntropyGoals)
-"""SGIM-IM; asks when a demonstration should reduce entropy more than the learner's own movement."""

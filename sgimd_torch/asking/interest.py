@@ -17,16 +17,17 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sgimd_torch.goals.checks import check_in
 from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.goals.regions import Region
+from sgimd_torch.goals.uniform import check_in
 from sgimd_torch.parts import Goals, Problem
 from sgimd_torch.spaces import Array
 
 AUTONOMOUS: Final = "autonomous"
-_FEWEST, _LAST = 4, 10  # least and greatest number of attempts that a measure of progress uses
+_FEWEST: Final = 4  # least number of attempts from which progress is computed
+_LAST: Final = 10  # greatest number of attempts from which progress is computed
 # Probability that first a goal uniform in T is drawn, and then a strategy by its interest at this goal.
-_ANYWHERE: Final = 0.5
+_GOAL_FIRST: Final = 0.5
 _GREATEST: Final = 10  # number of pairs (region, strategy), those with the greatest interest, of which one is drawn
 _TEMPERATURE: Final = 0.03  # difference of progress for which interest is e times as large
 _UNTRIED: Final = 1.0  # progress of an untried strategy, the greatest possible
@@ -50,8 +51,8 @@ def strategic_progress(points: Array, competences: Array, gains: Array) -> float
 
 def between_means(region: Region, below: NDArray[np.bool_]) -> float:
     """Squared difference of the mean progresses on the two sides of a cut."""
-    found = progresses(region.competences, region.gains)
-    return float((found[below].mean() - found[~below].mean()) ** 2)
+    values = progresses(region.competences, region.gains)
+    return float((values[below].mean() - values[~below].mean()) ** 2)
 
 
 BY_STRATEGY: Final = partial(InterestMap, g_max=50, window=_LAST, progress=strategic_progress, contrast=between_means)
@@ -101,17 +102,16 @@ class StrategicInterest(StrategicGoals):
         tried = self._tried.get(strategy)
         if tried is None or len(tried.points) < _FEWEST:
             return _UNTRIED
-        now = region, len(tried.points)
-        known = tried.known.get(region.path)
-        if known is not None and known[:2] == now:
-            return known[2]
-        here = region.strategies == strategy
-        if here.sum() >= _FEWEST:
-            found = region.interest_among(here)
+        cached = tried.cache.get(region.path)
+        if cached is not None and cached[:2] == (region, len(tried.points)):
+            return cached[2]
+        rows = region.strategies == strategy
+        if rows.sum() >= _FEWEST:
+            progress = region.interest_among(rows)
         else:
-            found = tried.progress_near((region.low + region.high) / 2, self._map.sides)
-        tried.known[region.path] = *now, found
-        return found
+            progress = tried.progress_near((region.low + region.high) / 2, self._map.sides)
+        tried.cache[region.path] = region, len(tried.points), progress
+        return progress
 
     def choose(self, context: ArrayLike, costs: Mapping[str, float]) -> tuple[str, Array]:
         """One of the strategies in ``costs``, and a goal ``(outcome_dim,)`` for this strategy.
@@ -120,20 +120,20 @@ class StrategicInterest(StrategicGoals):
             ValueError: ``context`` is not one point of C.
         """
         context, goal = check_in(self.problem.contexts, "context", context), self.problem.outcomes.sample(self.rng)
-        given = self.rng.random() < _ANYWHERE
-        regions = self._map.regions_at(np.concatenate((context, goal)) if given else context)
+        goal_first = self.rng.random() < _GOAL_FIRST
+        regions = self._map.regions_at(np.concatenate((context, goal)) if goal_first else context)
         pairs = [(region, name) for region in regions for name in costs]
         progress = np.array([[self.progress(region, name) for name in costs] for region in regions])
         cost = np.array([*costs.values()])
         cheapest = progress[:, [int(cost.argmin())]]
-        more = progress - cheapest
-        worth = cheapest + np.minimum(more, more / cost)
+        excess = progress - cheapest
+        worth = cheapest + np.minimum(excess, excess / cost)
         logarithms = (worth / _TEMPERATURE - np.log(cost)).ravel()
         best = np.argsort(-logarithms, kind="stable")[:_GREATEST]
         interests = np.exp(logarithms[best] - logarithms[best[0]])
         region, name = pairs[int(self.rng.choice(best, p=interests / interests.sum()))]
         dim = len(context)
-        return name, goal if given else self.rng.uniform(region.low[dim:], region.high[dim:])
+        return name, goal if goal_first else self.rng.uniform(region.low[dim:], region.high[dim:])
 
     def add(
         self, context: ArrayLike, goal: ArrayLike, competence: float, strategy: str = AUTONOMOUS, gain: float = 0.0
@@ -150,18 +150,18 @@ class StrategicInterest(StrategicGoals):
 
 
 class _Tried(NamedTuple):
-    """All attempts of a strategy. For the path of each region, ``known`` caches the region, the number of
-    attempts and the progress."""
+    """All attempts of a strategy. For the path of each region, ``cache`` holds the region, the number of attempts and
+    the progress."""
 
     points: Array
     competences: Array
     gains: Array
-    known: dict[str, tuple[Region, int, float]]
+    cache: dict[str, tuple[Region, int, float]]
 
     def extend(self, point: Array, competence: float, gain: float) -> _Tried:
         """All attempts and one more."""
         competences, gains = np.append(self.competences, competence), np.append(self.gains, gain)
-        return _Tried(np.vstack((self.points, point)), competences, gains, self.known)
+        return _Tried(np.vstack((self.points, point)), competences, gains, self.cache)
 
     def progress_near(self, point: Array, sides: Array) -> float:
         """Progress over the ten attempts nearest to a point of C x T; distances are relative to ``sides``."""

@@ -4,19 +4,19 @@ SGIM-IM and SGIM-ACTS, Nguyen & Oudeyer (2012): "Interactive learning gives the 
 robot learner", and "Active choice of teachers, learning strategies and goals for a socially guided intrinsic motivation
 learner". An attempt chooses a strategy and a goal together. If the strategy is to ask, the attempt requests a
 demonstration of the goal. The goal model is then told the competence at the goal and at the demonstrated outcome.
-    StrategicBabbling(problem, babbling, {"imitate left": Asking("left", Mimic(problem), cost=2.0)})
+    StrategicBabbling(babbling, {"imitate left": Asking("left", Mimic(problem), cost=2.0)})
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 
+from sgimd_torch.algorithms import ThroughBabbling
 from sgimd_torch.asking.interest import AUTONOMOUS, StrategicGoals
-from sgimd_torch.goals.regions import Region
-from sgimd_torch.parts import Part, Problem, Social, Strategy
+from sgimd_torch.parts import Social
 from sgimd_torch.spaces import Array, AskingAttempt, Request
 from sgimd_torch.strategies import GoalBabbling, recording_outcomes
 
@@ -26,16 +26,15 @@ class Asking(NamedTuple):
     and number of movements for which the learner rests until the reply comes."""
 
     teacher: str
-    answer: Social
+    social: Social
     cost: float = 1.0
     takes: int = 0
 
 
-class StrategicBabbling(Strategy):
+class StrategicBabbling(ThroughBabbling):
     """Goal babbling, or a request to a teacher; the goal model chooses between them by progress and cost.
 
     Args:
-        problem: problem to learn.
         babbling: autonomous strategy; its goal model chooses among all strategies.
         asking: mapping from names to strategies that ask a teacher.
 
@@ -43,26 +42,16 @@ class StrategicBabbling(Strategy):
         ValueError: a cost is not positive, or the goal model is no `StrategicGoals`.
     """
 
-    def __init__(self, problem: Problem, babbling: GoalBabbling, asking: Mapping[str, Asking]) -> None:
-        super().__init__(problem)
+    def __init__(self, babbling: GoalBabbling, asking: Mapping[str, Asking]) -> None:
+        super().__init__(babbling)
         if not isinstance(babbling.goals, StrategicGoals):
             raise ValueError(
                 f"goals must be StrategicGoals, which choose strategies, too, got a {type(babbling.goals).__name__}"
             )
-        self.costs = {AUTONOMOUS: 1.0, **{name: each.cost for name, each in asking.items()}}
+        self.costs = {AUTONOMOUS: 1.0, **{name: request.cost for name, request in asking.items()}}
         if not all(0 < cost < np.inf for cost in self.costs.values()):
             raise ValueError(f"costs must be positive and finite, got {self.costs}")
-        self.babbling, self.asking = babbling, asking
-        self.goals: StrategicGoals = babbling.goals
-
-    @property
-    def regions(self) -> Sequence[Region]:
-        """Regions of the goal model."""
-        return self.goals.regions
-
-    def maker(self, origin: str) -> Part:
-        """See `GoalBabbling.maker`."""
-        return self.babbling.maker(origin)
+        self.asking, self.goals = asking, babbling.goals
 
     def attempt(self, context: Array) -> AskingAttempt:
         """Movements by one strategy for one goal; if the teacher has no reply, the movements are autonomous.
@@ -74,7 +63,7 @@ class StrategicBabbling(Strategy):
         if strategy == AUTONOMOUS:
             yield from self.babbling.pursue(context, goal)
             return
-        teacher, answer, _, takes = self.asking[strategy]
+        teacher, social, _, takes = self.asking[strategy]
         lesson = yield Request(teacher, goal, strategy)
         before = self.babbling.competence(context, goal)
         if lesson is None:  # a request without a reply counts as no progress
@@ -83,13 +72,13 @@ class StrategicBabbling(Strategy):
             return
         for _ in range(takes):
             yield None
-        shown = lesson.demonstration.outcome
+        outcome_d = lesson.demonstration.outcome
         executed: list[tuple[Array, Array]] = []
-        there = self.babbling.competence(context, shown)
+        before_d = self.babbling.competence(context, outcome_d)
         try:
-            yield from recording_outcomes(answer.attempt(context, *lesson), executed)
+            yield from recording_outcomes(social.attempt(context, *lesson), executed)
         finally:  # interruption by another demonstration included
             outcomes = [outcome for _, outcome in executed]
             self.babbling.conclude(context, goal, outcomes, before, strategy)
-            if self.problem.outcomes.contains(shown):
-                self.babbling.conclude(context, shown, outcomes, there, strategy)
+            if self.problem.outcomes.contains(outcome_d):
+                self.babbling.conclude(context, outcome_d, outcomes, before_d, strategy)

@@ -2,7 +2,7 @@
 
 Nguyen & Oudeyer (2012), "Active choice of teachers, learning strategies and goals for a socially guided intrinsic
 motivation learner". A learner of `sgimd_torch.asking` asks; `run` hands its requests to the teachers.
-    teachers = {"left": AnsweringTeacher(shown, stream(seed, "left"), knows=low_half)}
+    teachers = {"left": AnsweringTeacher(demonstrations, stream(seed, "left"), knows=low_half)}
     teachers["left"].demonstrate(context, goal, memory)
 """
 
@@ -31,28 +31,22 @@ def everything(demonstrations: Sequence[Demonstration], rng: np.random.Generator
 
 def low_half(demonstrations: Sequence[Demonstration], rng: np.random.Generator) -> Sequence[Demonstration]:
     """Demonstrations whose first outcome coordinate is below the median."""
-    return [shown for shown in demonstrations if shown.outcome[0] < middle(demonstrations)]
+    return [demonstration for demonstration in demonstrations if demonstration.outcome[0] < middle(demonstrations)]
 
 
 def high_half(demonstrations: Sequence[Demonstration], rng: np.random.Generator) -> Sequence[Demonstration]:
     """Demonstrations whose first outcome coordinate is the median or above."""
-    return [shown for shown in demonstrations if shown.outcome[0] >= middle(demonstrations)]
+    return [demonstration for demonstration in demonstrations if demonstration.outcome[0] >= middle(demonstrations)]
 
 
-def mislabelled(demonstrations: Sequence[Demonstration], rng: np.random.Generator) -> Sequence[Demonstration]:
-    """All demonstrations, each with the outcome of another demonstration, so that every stated outcome is wrong."""
-    shift = 1 + int(rng.integers(max(1, len(demonstrations) - 1)))
-    order = rng.permutation(len(demonstrations))
-    labels = {int(row): demonstrations[label].outcome for row, label in zip(order, np.roll(order, shift), strict=True)}
-    return [replace(shown, outcome=labels[row]) for row, shown in enumerate(demonstrations)]
-
-
-def _recorded(number: int, demonstrations: Sequence[Demonstration], rng: np.random.Generator) -> list[Demonstration]:
-    here = demonstrations[0]
-    theirs = load_demonstrations(SHIPPED.with_name(f"demonstrator_{number}.npz"))
-    if theirs[0].trajectory.shape[1] != here.trajectory.shape[1]:
+def _of_demonstrator(
+    number: int, demonstrations: Sequence[Demonstration], rng: np.random.Generator
+) -> list[Demonstration]:
+    example = demonstrations[0]
+    recorded = load_demonstrations(SHIPPED.with_name(f"demonstrator_{number}.npz"))
+    if recorded[0].trajectory.shape[1] != example.trajectory.shape[1]:
         raise ValueError(f"demonstrator {number} has shown movements of the fishing rod, which this robot cannot make")
-    return [replace(shown, context=np.zeros_like(here.context)) for shown in theirs]
+    return [replace(demonstration, context=np.zeros_like(example.context)) for demonstration in recorded]
 
 
 class AnsweringTeacher(Demonstrator):
@@ -63,8 +57,8 @@ class AnsweringTeacher(Demonstrator):
     Args:
         demonstrations: demonstrations to choose from.
         rng: random stream of ``knows``, which is called once.
-        knows: function that chooses the demonstrations of this teacher: `everything`, `low_half`, `high_half`,
-            `mislabelled`, or a function of your own.
+        knows: function that chooses the demonstrations of this teacher: `everything`, `low_half`, `high_half`, or a
+            function of your own.
         within: distance in C x T beyond which there is no reply.
         takes: number of movements for which the learner rests until the reply has come.
 
@@ -85,7 +79,9 @@ class AnsweringTeacher(Demonstrator):
         if not within > 0:
             raise ValueError(f"within must be a distance above 0, got {within}")
         self.within, self.takes = within, check_count("takes", takes, 0)
-        self._points = np.stack([np.concatenate((shown.context, shown.outcome)) for shown in self.demonstrations])
+        self._points = np.stack(
+            [np.concatenate((demonstration.context, demonstration.outcome)) for demonstration in self.demonstrations]
+        )
 
     def demonstrate(self, context: Array, goal: Array, memory: Memory) -> Demonstration | None:
         """See `Demonstrator`."""
@@ -99,18 +95,14 @@ low_half_teacher = partial(AnsweringTeacher, knows=low_half)
 """Has the lower half of the demonstrations, by the first outcome coordinate."""
 high_half_teacher = partial(AnsweringTeacher, knows=high_half)
 """Has the upper half of the demonstrations, by the first outcome coordinate."""
-mislabelling = partial(AnsweringTeacher, knows=mislabelled)
-"""Has all demonstrations, but states a wrong outcome for each."""
-slow = partial(AnsweringTeacher, takes=10)
-"""Has all demonstrations; the learner rests for 10 movements until the reply comes."""
-demonstrator_1 = partial(AnsweringTeacher, knows=partial(_recorded, 1))
+demonstrator_1 = partial(AnsweringTeacher, knows=partial(_of_demonstrator, 1))
 """Has the recordings of the rod's demonstrator 1."""
-demonstrator_2 = partial(AnsweringTeacher, knows=partial(_recorded, 2))
+demonstrator_2 = partial(AnsweringTeacher, knows=partial(_of_demonstrator, 2))
 """Has the recordings of the rod's demonstrator 2."""
-demonstrator_3 = partial(AnsweringTeacher, knows=partial(_recorded, 3))
+demonstrator_3 = partial(AnsweringTeacher, knows=partial(_of_demonstrator, 3))
 """Has the recordings of the rod's demonstrator 3."""
 
 
 def middle(demonstrations: Sequence[Demonstration]) -> float:
     """The median of the first outcome coordinate, the border between the two halves."""
-    return float(np.median([shown.outcome[0] for shown in demonstrations]))
+    return float(np.median([demonstration.outcome[0] for demonstration in demonstrations]))

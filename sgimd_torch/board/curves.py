@@ -37,8 +37,8 @@ class Behaviour:
         """Count a movement."""
         move, self._movements = episode.move, episode.index + 1
         self._demonstrations += episode.demonstration is not None
-        regime = "failed" if episode.failed else "rest" if move is None else move.origin
-        self._since[f"regime/{regime}"] += 1
+        kind = "failed" if episode.failed else "rest" if move is None else move.origin
+        self._since[f"kind/{kind}"] += 1
         if episode.request is not None:
             self._answered += episode.reply == "shown"
             self._since[f"strategy/{episode.request.strategy}"] += 1
@@ -51,7 +51,7 @@ class Behaviour:
 
     def curves(self) -> dict[str, float]:
         """Values of the curves by tag: shares and means since the last call, counts since the first movement."""
-        total = sum(n for tag, n in self._since.items() if tag.startswith("regime/"))
+        total = sum(n for tag, n in self._since.items() if tag.startswith("kind/"))
         values = {tag: n / total for tag, n in self._since.items()}
         self._since = Counter(dict.fromkeys(self._since, 0))  # known tags keep their curves, at 0
         values["teacher/demonstrations"] = self._demonstrations
@@ -67,15 +67,15 @@ class Behaviour:
         return values
 
 
-def of_evaluation(found: Evaluation, near: float) -> dict[str, float]:
+def of_evaluation(evaluation: Evaluation, near: float) -> dict[str, float]:
     """Values of the curves of an evaluation by tag; a goal with an error of at most ``near`` counts as met."""
     return {
-        "error/mean": found.mean_error,
-        "error/median": float(np.median(found.errors)),
-        "error/p90": float(np.quantile(found.errors, 0.9)),
-        "error/noise_floor": found.noise_floor,
-        **({"error/failed": float(found.failed.sum())} if found.failed.any() else {}),
-        "goals/met": float((found.errors <= near).mean()),
+        "error/mean": evaluation.mean_error,
+        "error/median": float(np.median(evaluation.errors)),
+        "error/p90": float(np.quantile(evaluation.errors, 0.9)),
+        "error/noise_floor": evaluation.noise_floor,
+        **({"error/failed": float(evaluation.failed.sum())} if evaluation.failed.any() else {}),
+        "goals/met": float((evaluation.errors <= near).mean()),
     }
 
 
@@ -96,11 +96,11 @@ def of_regions(regions: Sequence[Region]) -> dict[str, float]:
 def branches(regions: Sequence[Region]) -> Mapping[str, list[Region]]:
     """The leaves below each node of the tree of regions, by the path of the node; deepest nodes are at level ``DEPTH``.
 
-    The cells of a `ProgressGrid`, such as "R.3.7", form no tree: "R" is their only node.
+    Cells that never split, such as "R.3.7", form no tree: "R" is their only node.
     """
-    found: dict[str, list[Region]] = {}
+    leaves_below: dict[str, list[Region]] = {}
     for region in regions:
         path = region.path.partition(".")[0]
         for length in range(1, min(len(path), DEPTH + 1) + 1):
-            found.setdefault(path[:length], []).append(region)
-    return dict(sorted(found.items()))
+            leaves_below.setdefault(path[:length], []).append(region)
+    return dict(sorted(leaves_below.items()))

@@ -21,7 +21,7 @@ LEGEND: Final[Mapping[str, str]] = {
     "interest": "Recent change of competence in a region, eq. (3). The learner draws more goals where interest is "
     "high. After a cut of a region, its curve is the mean over its parts' goals.",
     "regions": "Number of regions of the goal model.",
-    "regime": "Share of each kind of movement since the last point: global exploration, local optimisation, imitation, "
+    "kind": "Share of each kind of movement since the last point: global exploration, local optimisation, imitation, "
     "babbling, rest, or failed movements.",
     "goals/met": "Share of the benchmark goals whose error is at most half the side of a benchmark tile.",
     "goals/reached": "Share of the last 50 goals of the learner that a movement reached within the tolerance.",
@@ -44,12 +44,12 @@ LEGEND: Final[Mapping[str, str]] = {
 }
 
 
-def sentence(tag: str, unit: str) -> str:
+def meaning_of(tag: str, unit: str) -> str:
     """The meaning of a tag, with the ``unit`` of T; "" stands for no unit."""
     return in_unit(LEGEND.get(tag) or LEGEND[tag.partition("/")[0]], unit)
 
 
-def page(unit: str) -> str:
+def as_markdown(unit: str) -> str:
     """The meaning of all tags, in Markdown; a list, because TensorBoard would break the tags of a table."""
     lines = [f"- **{tag}{'' if '/' in tag else '/...'}** {meaning}" for tag, meaning in LEGEND.items()]
     return in_unit("Steps are movements.\n\n" + "\n".join(lines), unit)

@@ -10,20 +10,72 @@ from __future__ import annotations
 import json
 import math
 import re
+import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
 from tensorboardX import summary
+from tensorboardX.event_file_writer import EventsWriter
+from tensorboardX.proto.event_pb2 import Event, SessionLog
+from tensorboardX.proto.summary_pb2 import Summary
 
 from sgimd_torch.board.curves import Behaviour, of_evaluation, of_regions
-from sgimd_torch.board.events import EventFile
-from sgimd_torch.board.legend import page, sentence
+from sgimd_torch.board.legend import as_markdown, meaning_of
 from sgimd_torch.board.pictures import draw
 from sgimd_torch.evaluation import Benchmark, Evaluation
 from sgimd_torch.spaces import Box, Episode
 
 EVERY: Final = 50  # number of movements from one point of a curve to the next
+
+
+class EventFile:
+    """An event file: summaries wait in memory until ``begin``, which replaces earlier event files of the ``folder``.
+
+    It uses tensorboardX's `EventsWriter`, not `SummaryWriter`, which writes in a thread, so a full disk would not stop
+    the run.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        # An open TensorBoard drops the points of earlier files when it reads this event.
+        self._waiting = [Event(session_log=SessionLog(status=SessionLog.START))]
+        self._writer: EventsWriter | None = None
+
+    def begin(self) -> None:
+        """Write the waiting summaries to a new file, then remove the earlier files.
+
+        The new file has a new name, because an open TensorBoard does not read a file of a known name again.
+
+        Raises:
+            OSError: the folder cannot be written.
+        """
+        earlier = sorted(self._folder.glob("events.out.tfevents.*"))
+        self._writer = EventsWriter(str(self._folder / "events"), f".{time.time_ns()}")
+        for event in self._waiting:
+            self._writer.write_event(event)
+        self._waiting.clear()
+        self.flush()
+        for path in earlier:
+            path.unlink(missing_ok=True)
+
+    def add(self, step: int, summary: Summary) -> None:
+        """Add a summary at a step; before ``begin`` it waits in memory."""
+        event = Event(step=step, wall_time=time.time(), summary=summary)
+        if self._writer is None:
+            self._waiting.append(event)
+        else:
+            self._writer.write_event(event)
+
+    def flush(self) -> None:
+        """Bring all written summaries to the disk; before ``begin``, do nothing."""
+        if self._writer is not None:
+            self._writer.flush()
+
+    def close(self) -> None:
+        """Flush and close the file; if ``begin`` was not called, the earlier event files stay."""
+        if self._writer is not None:
+            self._writer.close()
 
 
 class BoardListener(EventFile):
@@ -52,9 +104,10 @@ class BoardListener(EventFile):
         self._explained: set[str] = set()
         # The result on TensorBoard's page of hyperparameters.
         result = "error/mean" if parts.config.evaluations else "goals/missed_by"
-        for each in summary.hparams(hparams_of(parts.config), {result: math.nan})[:2]:  # the third marks the end
-            self.add(0, each)
-        self.add(0, summary.text("about/legend", page(self._space.unit)))
+        names, values, _ = summary.hparams(hparams_of(parts.config), {result: math.nan})  # the third marks the end
+        self.add(0, names)
+        self.add(0, values)
+        self.add(0, summary.text("about/legend", as_markdown(self._space.unit)))
 
     def episode(self, episode: Episode, replayed: bool) -> None:
         """Count a movement; after every 50th movement the curves get a point. Replayed movements have no times."""
@@ -69,14 +122,14 @@ class BoardListener(EventFile):
             self.add(self._movements, summary.text("about/changes", str(change)))
         self._changes = len(self._learner.changes)
 
-    def evaluated(self, movements: int, found: Mapping[str, Evaluation]) -> None:
+    def evaluated(self, movements: int, evaluations: Mapping[str, Evaluation]) -> None:
         """Show an evaluation; of inverse models other than the run's own, show only the mean error.
 
         Pictures take as long as 100 movements. So they are drawn only when the number of movements has doubled since
         the last pictures, and at the end.
         """
-        own, goals = found["own"], self._benchmark.goals
-        others = {f"error/by_{answer}": each.mean_error for answer, each in found.items() if answer != "own"}
+        own, goals = evaluations["own"], self._benchmark.goals
+        others = {f"error/by_{name}": other.mean_error for name, other in evaluations.items() if name != "own"}
         self._scalars({**of_evaluation(own, self._benchmark.side / 2), **others})
         if movements >= 2 * self._drawn_at or movements == self._config.movements:
             self._drawn_at = movements
@@ -97,7 +150,7 @@ class BoardListener(EventFile):
         """Add a summary to TensorBoard's page ``plugin``; the first summary of a tag carries the tag's explanation."""
         if tag not in self._explained:
             self._explained.add(tag)
-            made.value[0].metadata.summary_description = sentence(tag, self._space.unit)
+            made.value[0].metadata.summary_description = meaning_of(tag, self._space.unit)
             made.value[0].metadata.plugin_data.plugin_name = plugin
         self.add(self._movements, made)
 
@@ -109,10 +162,10 @@ def hparams_of(config: Any) -> dict[str, bool | float | str]:
     name of the variant, such as "sgim-d,budget=5". So each run of a sweep has all options that the sweep varies.
     """
     varied = re.findall(r"(?:^|,)([\w.-]+)=", config.variant)
-    typed = {name.replace("_", "-"): value for name, value in config.settings.items()}
+    settings = {name.replace("_", "-"): value for name, value in config.settings.items()}
     chosen = ["algorithm", "environment", "seed", *(name.replace("_", "-") for name in dict(config.parts)), *varied]
     return {
         name: value if isinstance(value, bool | int | float | str) else json.dumps(value)
-        for name, value in typed.items()
+        for name, value in settings.items()
         if name in chosen
     }

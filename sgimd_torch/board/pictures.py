@@ -73,12 +73,12 @@ def _competence(ax: Axes, regions: Sequence[Region], section: Section) -> None:
         text.set_bbox({"facecolor": "white", "alpha": 0.9, "edgecolor": "none", "pad": 1.2})
 
 
-def _pixels(picture: Callable[[Axes, Section], object], shown: Sequence[Section]) -> NDArray[np.uint8]:
+def _pixels(picture: Callable[[Axes, Section], object], maps: Sequence[Section]) -> NDArray[np.uint8]:
     """The pixels of a picture with its sections side by side, as large as TensorBoard shows it."""
-    size = (4.2 * len(shown), shown[0].height(WIDE) + MARGIN)
+    size = (4.2 * len(maps), maps[0].height(WIDE) + MARGIN)
     with rc_context(STYLE):
         figure = Figure(size, dpi=120, layout="constrained")
-        for ax, section in zip(figure.subplots(1, len(shown), squeeze=False).flat, shown, strict=True):
+        for ax, section in zip(figure.subplots(1, len(maps), squeeze=False).flat, maps, strict=True):
             picture(ax, section)
         canvas: Any = FigureCanvasAgg(figure)
         figure.draw_without_rendering()  # the layout needs two passes; a single pass cuts labels off

@@ -72,19 +72,19 @@ def load_demonstrations(
         ("outcome dimensions", outcomes, outcome_dim),
         ("context dimensions", contexts, context_dim),
     ):
-        found = field.shape[1]
-        if wanted is not None and found != wanted:
-            raise ValueError(f"{source} has {found} {name}, the robot has {wanted}; was it recorded on another robot?")
+        if wanted not in (None, field.shape[1]):
+            raise ValueError(
+                f"{source} has {field.shape[1]} {name}, the robot has {wanted}; was it recorded on another robot?"
+            )
     starts = np.cumsum(lengths)[:-1]
-    split = (np.split(field.astype(np.float64), starts) for field in (times, trajectories))
-    rows = (outcomes.astype(np.float64), contexts.astype(np.float64))
-    read: list[Demonstration] = []
-    for t, trajectory, o, c in zip(*split, *rows, strict=True):
+    parts = (contexts, np.split(times, starts), np.split(trajectories, starts), outcomes)
+    demonstrations: list[Demonstration] = []
+    for part in zip(*parts, strict=True):
         try:
-            read.append(Demonstration(c, t, trajectory, o))
+            demonstrations.append(Demonstration(*(values.astype(np.float64) for values in part)))
         except ValueError as error:
-            raise ValueError(f"{source}: recording {len(read)}: {error}") from error
-    return read
+            raise ValueError(f"{source}: recording {len(demonstrations)}: {error}") from error
+    return demonstrations
 
 
 def _check(source: str, fields: dict[str, Array]) -> None:

@@ -1,8 +1,8 @@
-"""Recordings from tables: each row is a sample of a recording, and the user names the columns.
+"""Recordings from tables: a row is a sample of a recording, and the user names the columns.
 
-    columns = Columns(joints=("shoulder", "elbow"), outcome=("x", "y"))
-    found = read_text("recordings", columns)      # of text.py: a folder with a file for each recording, or one table
-    found = in_units(found, {"": "deg"})          # of units.py: joints in rad
+    names = ColumnNames(joints=("shoulder", "elbow"), outcome=("x", "y"))
+    recordings = read_text("recordings", names)   # of text.py: a folder with a file for each recording, or one table
+    recordings = in_units(recordings, {"": "deg"})                                   # of units.py: joints in rad
 A column may hold vectors, as in LeRobot: ``observation.state`` is the whole vector, ``observation.state[0:6]`` and
 ``observation.state[2]`` are some of its entries.
 """
@@ -12,18 +12,19 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from sgimd_torch.spaces import Array, Demonstration, check_vector
+from sgimd_torch.spaces import Array, Demonstration
 
 NUMBER: Final = re.compile(r"[+-]?(\d+(\.\d*|,\d+)?|[.,]\d+)([eE][+-]?\d+)?")
-_NAME: Final = re.compile(r"(?P<name>[^\[\]]+)(\[(?P<first>\d+)(?P<slice>:(?P<end>\d+)?)?\])?")
+_NAME: Final = re.compile(r"(?P<column>[^\[\]]+)(\[(?P<first>\d+)(?P<slice>:(?P<end>\d+)?)?\])?")
 
 
 @dataclass(frozen=True)
-class Columns:
+class ColumnNames:
     """Names of the columns of a table.
 
     Args:
@@ -33,7 +34,7 @@ class Columns:
         time: column of the time (s); the first time of a recording counts as 0.
         recording: column with the number or name of the recording of each row; None: a table is one recording.
         rate: samples per second of a table without times; None if ``time`` has the times.
-        heads: names of all columns of a text without names; () if its first row has the names.
+        header: names of all columns of a text without names; () if its first row has the names.
     """
 
     joints: tuple[str, ...]
@@ -42,24 +43,23 @@ class Columns:
     time: str = "time"
     recording: str | None = None
     rate: float | None = None
-    heads: tuple[str, ...] = ()
+    header: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for name in self.names:
+        for name in self._names:
             if _NAME.fullmatch(name) is None:
                 raise ValueError(f"{name!r} does not name a column; write, for example, state, state[2] or state[0:6]")
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """All columns as the user wrote them, with entries in brackets."""
+    def _names(self) -> tuple[str, ...]:
         timed = (self.time,) if self.rate is None else ()
         grouped = () if self.recording is None else (self.recording,)
         return (*self.joints, *self.outcome, *self.context, *timed, *grouped)
 
     @property
-    def plain(self) -> list[str]:
-        """All columns, each once, without entries in brackets."""
-        return list(dict.fromkeys(name.partition("[")[0] for name in self.names))
+    def columns(self) -> list[str]:
+        """Names of the needed columns, without entries in brackets and without repetitions."""
+        return list(dict.fromkeys(name.partition("[")[0] for name in self._names))
 
 
 class Recording(NamedTuple):
@@ -67,15 +67,15 @@ class Recording(NamedTuple):
 
     Attributes:
         name: name of the recording, with the name of its file.
-        shown: the recording; its outcome is empty if the file has none. None if the recording cannot be used.
+        demonstration: the recording; its outcome is empty if the file has none. None if it cannot be used.
         joints: names of the joints.
-        refused: reason why the recording cannot be used, "" if it can.
+        fault: reason why the recording cannot be used, "" if it can.
     """
 
     name: str
-    shown: Demonstration | None
+    demonstration: Demonstration | None
     joints: tuple[str, ...] = ()
-    refused: str = ""
+    fault: str = ""
 
 
 class Table(NamedTuple):
@@ -83,7 +83,7 @@ class Table(NamedTuple):
 
     Attributes:
         name: name of the file in messages.
-        columns: ``(n_rows,)`` values or texts, or ``(n_rows, k)`` vectors, for each name in ``Columns.plain``.
+        columns: ``(n_rows,)`` values or texts, or ``(n_rows, k)`` vectors, for each of ``ColumnNames.columns``.
         rows: number of each row in messages.
         entries: names of the entries of a vector, by column.
     """
@@ -94,95 +94,89 @@ class Table(NamedTuple):
     entries: Mapping[str, Sequence[str]]
 
 
-def recordings(table: Table, columns: Columns) -> list[Recording]:
-    """The recordings of one table. A fault of one recording is told in its ``refused``, with the row.
+def recordings_of(table: Table, names: ColumnNames) -> list[Recording]:
+    """The recordings of one table. A fault of one recording is told in its ``fault``, with the row.
 
     Raises:
         ValueError: the rows of a recording are not adjacent.
     """
-    found = []
-    for name, rows in _groups(table, columns.recording):
+    recordings = []
+    for title, rows in _groups(table, names.recording):
         try:
-            joints, names = _values(table, columns.joints, rows)
-            (outcome, _), (context, _) = (_values(table, each, rows) for each in (columns.outcome, columns.context))
+            joints, joint_names = _values(table, names.joints, rows)
+            outcomes, contexts = (_values(table, columns, rows)[0] for columns in (names.outcome, names.context))
             if len(joints) < 2:
-                raise ValueError(f"it has 1 sample, but needs 2 or more; does {columns.recording} number the rows?")
-            shown = Demonstration(context[0], _times(table, columns, rows), joints, outcome[-1])
-            found.append(Recording(name, shown, tuple(names)))
+                raise ValueError(f"it has 1 sample, but needs 2 or more; does {names.recording} number the rows?")
+            demonstration = Demonstration(contexts[0], _times(table, names, rows), joints, outcomes[-1])
+            recordings.append(Recording(title, demonstration, tuple(joint_names)))
         except ValueError as error:
-            found.append(Recording(name, None, refused=str(error)))
-    return found
+            recordings.append(Recording(title, None, fault=str(error)))
+    return recordings
 
 
-def _times(table: Table, columns: Columns, rows: slice) -> Array:
+def _times(table: Table, names: ColumnNames, rows: slice) -> Array:
     """``(n_samples,)`` s, from 0."""
-    if columns.rate is not None:
-        return np.arange(rows.stop - rows.start) / columns.rate
-    times, _ = _values(table, (columns.time,), rows)
+    if names.rate is not None:
+        return np.arange(rows.stop - rows.start) / names.rate
+    times, _ = _values(table, (names.time,), rows)
     if times.shape[1] != 1:
-        raise ValueError(f"{columns.time} must be one number for each row, got {times.shape[1]}")
+        raise ValueError(f"{names.time} must be one number for each row, got {times.shape[1]}")
     falls = np.flatnonzero(np.diff(times[:, 0]) <= 0)
     if len(falls):
-        row = rows.start + falls[0] + 1
-        raise ValueError(f"row {table.rows[row]}: {columns.time} must increase from row to row; were rows shuffled?")
+        row = table.rows[rows.start + falls[0] + 1]
+        raise ValueError(f"row {row}: {names.time} must increase from row to row; were rows shuffled?")
     return times[:, 0] - times[0, 0]
 
 
 def _values(table: Table, names: Sequence[str], rows: slice) -> tuple[Array, list[str]]:
     """``(n_samples, dim)`` values of the columns ``names``, side by side, and the name of each dimension."""
     parts, labels = [np.empty((rows.stop - rows.start, 0))], list[str]()
-    for written in names:
-        match = _NAME.fullmatch(written)
+    for name in names:
+        match = _NAME.fullmatch(name)
         assert match is not None
-        name = match["name"]
-        values = _numbers(table, name, rows)
-        vectors = values.reshape(len(values), -1)
-        plain = [name] if values.ndim == 1 else [f"{name}[{k}]" for k in range(vectors.shape[1])]
-        called = table.entries.get(name) or plain
-        if len(called) != len(plain):
-            raise ValueError(f"{name} has {len(plain)} entries, but names of {len(called)}: {', '.join(called)}")
-        first, end = int(match["first"] or 0), vectors.shape[1]
-        if match["first"] is not None:
-            end = first + 1 if match["slice"] is None else int(match["end"] or end)
-        if not first < end <= vectors.shape[1]:
-            raise ValueError(f"there is no {written}: {name} has {vectors.shape[1]} entries")
-        part = vectors[:, first:end]
-        usable = np.isfinite(part).all(axis=1)
-        if not usable.all():
-            row = int(usable.argmin())
-            raise ValueError(f"row {table.rows[rows.start + row]}: {written} must be finite, got {part[row].tolist()}")
-        parts.append(check_vector(written, part, part.shape[1]))
-        labels += called[first:end]
+        column, first = match["column"], int(match["first"] or 0)
+        values = _numbers(table, column, rows)
+        size = values.shape[1]
+        entries = table.entries.get(column) or ([column] if size == 1 else [f"{column}[{k}]" for k in range(size)])
+        if len(entries) != size:
+            raise ValueError(f"{column} has {size} entries, but names of {len(entries)}: {', '.join(entries)}")
+        end = first + 1 if match["first"] and not match["slice"] else int(match["end"] or size)
+        if not first < end <= size:
+            raise ValueError(f"there is no {name}: {column} has {size} entries")
+        part = values[:, first:end]
+        finite = np.isfinite(part).all(axis=1)
+        if not finite.all():
+            row = int(finite.argmin())
+            raise ValueError(f"row {table.rows[rows.start + row]}: {name} must be finite, got {part[row].tolist()}")
+        parts.append(part)
+        labels += entries[first:end]
     return np.concatenate(parts, axis=1), labels
 
 
-def _numbers(table: Table, name: str, rows: slice) -> Array:
-    values = table.columns[name][rows]
+def _numbers(table: Table, column: str, rows: slice) -> Array:
+    """``(n_samples, k)`` numbers of a column of vectors or texts; a column of single numbers has k = 1."""
+    values = table.columns[column][rows]
     if values.dtype.kind != "U":
         try:
-            return np.array(values.tolist(), dtype=np.float64)
+            return np.array(values.tolist(), dtype=np.float64).reshape(len(values), -1)
         except (TypeError, ValueError) as error:
-            raise ValueError(f"{name} must be numbers: {error}") from error
+            raise ValueError(f"{column} must be numbers: {error}") from error
     for row, text in enumerate(values.tolist(), rows.start):
         if NUMBER.fullmatch(text) is None:
-            named = text == name
-            hint = "the first row names the columns, so leave out --columns" if named else "is a field missing?"
-            raise ValueError(f"row {table.rows[row]}: {name} is {text[:40]!r}, no number; {hint}")
-    return np.array([float(text.replace(",", ".")) for text in values.tolist()])
+            is_header = text == column
+            hint = "the first row names the columns, so leave out --columns" if is_header else "is a field missing?"
+            raise ValueError(f"row {table.rows[row]}: {column} is {text[:40]!r}, no number; {hint}")
+    return np.array([[float(text.replace(",", "."))] for text in values.tolist()])
 
 
 def _groups(table: Table, recording: str | None) -> list[tuple[str, slice]]:
     """Pairs (name for messages, rows), one for each recording, in order."""
-    n = len(table.rows)
     if recording is None:
-        return [(table.name, slice(0, n))]
-    names = table.columns[recording].tolist()
-    starts = [row for row in range(n) if row == 0 or names[row] != names[row - 1]]
-    found = [names[row] for row in starts]
-    if len(set(found)) < len(found):
-        twice = next(name for name in found if found.count(name) > 1)
-        raise ValueError(f"the rows of recording {twice} are not adjacent; sort them by {recording} and time")
-    return [
-        (f"{table.name}: {recording} {names[row]}", slice(row, end))
-        for row, end in zip(starts, [*starts[1:], n], strict=True)
-    ]
+        return [(table.name, slice(0, len(table.rows)))]
+    groups, start = dict[object, slice](), 0
+    for name, rows in groupby(table.columns[recording].tolist()):
+        if name in groups:
+            raise ValueError(f"the rows of recording {name} are not adjacent; sort them by {recording} and time")
+        end = start + len(list(rows))
+        groups[name], start = slice(start, end), end
+    return [(f"{table.name}: {recording} {name}", rows) for name, rows in groups.items()]

@@ -1,8 +1,8 @@
 """Recordings from a LeRobot dataset (format v2.1 or v3) on disk; videos are not read.
 
-    columns = Columns(joints=("observation.state[0:6]",), outcome=("observation.environment_state[0:2]",),
-                      time="timestamp", recording="episode_index")
-    found, doubt = read_lerobot("datasets/my_arm", columns)
+    names = ColumnNames(joints=("observation.state[0:6]",), outcome=("observation.environment_state[0:2]",),
+                        time="timestamp", recording="episode_index")
+    recordings, unclear = read_lerobot("datasets/my_arm", names)
 ``meta/info.json`` has the version, the counts and the features. ``data/chunk-000/*.parquet`` and further folders have
 a row for each frame; a file of v3 may hold several episodes. The name of an entry, such as ``gripper.pos``, is a
 column, too; if several features have such an entry, that of ``observation.state`` is meant.
@@ -14,12 +14,13 @@ import json
 import os
 from dataclasses import replace
 from difflib import get_close_matches
+from itertools import chain
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from sgimd_torch.demonstrations.columns import Columns, Recording, Table, recordings
+from sgimd_torch.demonstrations.columns import ColumnNames, Recording, Table, recordings_of
 from sgimd_torch.demonstrations.text import POINTER
 from sgimd_torch.files import check_density, check_regular
 
@@ -29,17 +30,17 @@ try:
 except ImportError as error:
     raise ImportError(f"a LeRobot dataset needs pyarrow: pip install 'sgimd-torch[lerobot]' ({error})") from error
 
-STATE: Final = "observation.state"
+STATE: Final = "observation.state"  # the feature that is meant if several have an entry of one name
 _NUMBERS: Final = ("INT32", "INT64", "FLOAT", "DOUBLE")  # parquet's names of types
-_OF_ITS_RANGE: Final = ("so100", "so101", "koch", "lekiwi")  # robots that record shares of the ranges of joints
+_RECORD_SHARES: Final = ("so100", "so101", "koch", "lekiwi")  # robots that record shares of the ranges of joints
 
 
-def read_lerobot(root: str | os.PathLike[str], columns: Columns) -> tuple[list[Recording], str]:
-    """All episodes of a dataset in order, and the reason to doubt that they are in rad ("": none).
+def read_lerobot(root: str | os.PathLike[str], names: ColumnNames) -> tuple[list[Recording], str]:
+    """All episodes of a dataset in order, and the reason why their units are unclear ("": none).
 
     Args:
         root: folder of the dataset, with ``meta`` and ``data``.
-        columns: names of features or entries; usually the time is ``timestamp``, the recording ``episode_index``.
+        names: names of features or entries; usually the time is ``timestamp``, the recording ``episode_index``.
 
     Raises:
         ValueError: the folder is no dataset, has another version, lacks a feature, or has not as many episodes and
@@ -48,51 +49,52 @@ def read_lerobot(root: str | os.PathLike[str], columns: Columns) -> tuple[list[R
     """
     root = Path(root)
     if root.is_file():
-        whole = next((each for each in root.absolute().parents if (each / "meta").is_dir()), "its folder with meta")
-        raise ValueError(f"{root} is one file of a LeRobot dataset; name the dataset instead: {whole}")
+        dataset = next(
+            (folder for folder in root.absolute().parents if (folder / "meta").is_dir()), "its folder with meta"
+        )
+        raise ValueError(f"{root} is one file of a LeRobot dataset; name the dataset instead: {dataset}")
     info = _info(root)
     version = str(info.get("codebase_version"))
     if version != "v2.1" and not version.startswith("v3."):
         raise ValueError(f"{root} has format {version[:20]}, v2.1 and v3 can be read; lerobot converts older formats")
     features = info.get("features", {})
     entries = {name: _entries(feature) for name, feature in features.items()}
-
     joints, outcome, context = (
-        tuple(_found(name, entries) for name in names) for names in (columns.joints, columns.outcome, columns.context)
+        tuple(_indexed(name, entries) for name in group) for group in (names.joints, names.outcome, names.context)
     )
-    columns = replace(columns, joints=joints, outcome=outcome, context=context)
-    for name in columns.plain:
+    names = replace(names, joints=joints, outcome=outcome, context=context)
+    for name in names.columns:
         if name not in features:
-            known = [*entries, *(each for names in entries.values() for each in names)]
+            known = [*entries, *chain.from_iterable(entries.values())]
             near = " or ".join(get_close_matches(name, known, 3, 0.0))
             raise ValueError(f"{root} has no feature {name}; did you mean {near}? It has {', '.join(features)}")
     files = sorted((root / "data").glob("*/*.parquet"))
     if not files:
         raise ValueError(f"{root} has no data/chunk-000/*.parquet; were only its videos copied?")
-    parts = [_columns(file, columns.plain) for file in files]
-    table = {name: np.concatenate([part[name] for part in parts]) for name in columns.plain}
-    rows = len(table[columns.plain[0]])
-    found = recordings(Table(root.name, table, range(rows), entries), columns)
-    for what, said, read in (("frames", "total_frames", rows), ("episodes", "total_episodes", len(found))):
-        if columns.recording == "episode_index" and info.get(said) != read:
-            raise ValueError(f"{root} says {info.get(said)} {what}, but {read} were found; is a file missing?")
+    parts = [_columns(file, names.columns) for file in files]
+    columns = {name: np.concatenate([part[name] for part in parts]) for name in names.columns}
+    n_rows = len(columns[names.columns[0]])
+    recordings = recordings_of(Table(root.name, columns, range(n_rows), entries), names)
+    for noun, key, n in (("frames", "total_frames", n_rows), ("episodes", "total_episodes", len(recordings))):
+        if names.recording == "episode_index" and info.get(key) != n:
+            raise ValueError(f"{root} says {info.get(key)} {noun}, but {n} were found; is a file missing?")
     robot = str(info.get("robot_type"))
     records = "records degrees or shares of a joint's range, -100..100, and of the gripper 0..100"
-    return found, f"a robot {robot} {records}" if any(name in robot for name in _OF_ITS_RANGE) else ""
+    return recordings, f"a robot {robot} {records}" if any(name in robot for name in _RECORD_SHARES) else ""
 
 
 def _entries(feature: Any) -> list[str]:
     """Names of the entries of a feature; a list of names may lie in a list, or under a name."""
     names = feature.get("names") if isinstance(feature, dict) else None
-    if not isinstance(names, list | dict):
-        return []
     if isinstance(names, dict):  # {"motors": [names]}, or {name: number}
-        names = [each if isinstance(each, list) else name for name, each in names.items()]
-    flat = [str(name) for each in names for name in (each if isinstance(each, list) else [each])]
+        names = [value if isinstance(value, list) else name for name, value in names.items()]
+    if not isinstance(names, list):
+        return []
+    flat = [str(name) for part in names for name in (part if isinstance(part, list) else [part])]
     return flat if flat and feature.get("shape") == [len(flat)] else []
 
 
-def _found(name: str, entries: dict[str, list[str]]) -> str:
+def _indexed(name: str, entries: dict[str, list[str]]) -> str:
     """``feature[k]`` for the name of an entry; another name is left alone."""
     homes = {feature: f"{feature}[{names.index(name)}]" for feature, names in entries.items() if name in names}
     if name in entries or not homes:
@@ -127,20 +129,14 @@ def _columns(file: Path, names: list[str]) -> dict[str, np.ndarray]:
         about = pyarrow.parquet.read_metadata(file)
         groups = [about.row_group(k) for k in range(about.num_row_groups)]
         chunks = [group.column(k) for group in groups for k in range(group.num_columns)]
-        wanted = tuple(f"{name}." for name in names)
-        read = [chunk for chunk in chunks if f"{chunk.path_in_schema}.".startswith(wanted)]
-        for chunk in read:
+        prefixes = tuple(f"{name}." for name in names)
+        chunks = [chunk for chunk in chunks if f"{chunk.path_in_schema}.".startswith(prefixes)]
+        for chunk in chunks:
             if chunk.physical_type not in _NUMBERS:  # few bytes may stand for any number of long texts
                 raise ValueError(f"{chunk.path_in_schema} has {chunk.physical_type}, no numbers")
-        check_density(sum(8 * chunk.num_values for chunk in read), file)
+        check_density(sum(8 * chunk.num_values for chunk in chunks), file)
         table = pyarrow.parquet.read_table(file, columns=names, page_checksum_verification=True)
         return {name: np.array(table.column(name).to_pylist()) for name in names}
-    except (
-        pyarrow.ArrowException,
-        OSError,
-        ValueError,
-        KeyError,
-        MemoryError,
-        OverflowError,
-    ) as error:  # ValueError: vectors differ in length
+    # ValueError: vectors differ in length.
+    except (pyarrow.ArrowException, OSError, ValueError, KeyError, MemoryError, OverflowError) as error:
         raise ValueError(f"{file} cannot be read: {str(error)[:200]}; is it whole, with columns {names}?") from error

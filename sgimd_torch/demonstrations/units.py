@@ -1,6 +1,6 @@
 """Recordings as a robot needs them: joints in rad, at another speed, without the pauses at their ends.
 
-found = [paced(each, 2.0) for each in in_units(found, {"": "deg", "gripper": "0:100"}, ranges)]
+recordings = [paced(recording, 2.0) for recording in in_units(recordings, {"": "deg", "gripper": "0:100"}, ranges)]
 """
 
 from __future__ import annotations
@@ -24,69 +24,75 @@ _FEWEST: Final = 4  # steps of a movement; with a jerk all other steps are slow,
 
 
 def in_units(
-    found: Sequence[Recording], units: Mapping[str, str], ranges: Box | None = None, *, doubt: str = ""
+    recordings: Sequence[Recording], units: Mapping[str, str], ranges: Box | None = None, *, unclear: str = ""
 ) -> list[Recording]:
     """The recordings with joints in rad.
 
     Args:
-        found: recordings with joints as they were recorded.
+        recordings: recordings with joints as they were recorded.
         units: "rad", "deg" or a range such as "0:100", by name of the joint; the name "" means all other joints. A
             range maps onto the range of the joint. Commands that are no angles are left alone by "rad".
         ranges: ``(n_joints,)`` ranges of the robot's joints; None if they are unknown.
-        doubt: reason why the unit of every joint must be said; "" if there is none.
+        unclear: reason why the unit of every joint must be said; "" if there is none.
 
     Raises:
         ValueError: a name is no joint, a unit is unknown, a range has no robot to map onto, or the unit of a joint must
-            be said, because of ``doubt`` or because the joint reads more than a turn.
+            be said, because units are ``unclear`` or because the joint reads more than a turn.
     """
-    usable = [each for each in found if each.shown is not None]
-    joints = usable[0].joints if usable else ()
-    said = dict[str, str]()
+    joints = next((recording.joints for recording in recordings if recording.demonstration), ())
+    unit_of = dict[str, str]()
     for key, unit in sorted(units.items()):  # "" first
-        meant = [name for name in joints if key in ("", name, name.partition(".")[0])]
-        if joints and not meant:
+        named = [joint for joint in joints if key in ("", joint, joint.partition(".")[0])]
+        if joints and not named:
             near = " or ".join(get_close_matches(key, joints, 3, 0.0))
             raise ValueError(f"--unit {key}={unit}: no joint is named {key}; did you mean {near}?")
-        said |= dict.fromkeys(meant, unit)
+        unit_of |= dict.fromkeys(named, unit)
     if ranges is not None and joints and ranges.dim != len(joints):
         raise ValueError(f"the robot has {ranges.dim} joints, the recordings have {len(joints)}: {', '.join(joints)}")
     scales, shifts = np.ones(len(joints)), np.zeros(len(joints))
-    for k, name in enumerate(joints):
-        unit, match = said.get(name, ""), _RANGE.fullmatch(said.get(name, ""))
+    for k, joint in enumerate(joints):
+        unit = unit_of.get(joint, "")
+        match = _RANGE.fullmatch(unit)
+        if not unit and unclear:
+            raise ValueError(f"{unclear}; say all units, for example --unit deg,{joints[-1].partition('.')[0]}=0:100")
         if not unit:
-            most, where = max((np.abs(each.shown.trajectory[:, k]).max(), each.name) for each in usable if each.shown)
-            if doubt:
-                raise ValueError(f"{doubt}; say all units, for example --unit deg,{joints[-1].partition('.')[0]}=0:100")
+            most, name = max(
+                (np.abs(r.demonstration.trajectory[:, k]).max(), r.name) for r in recordings if r.demonstration
+            )
             if most > (_TURN if ranges is None else max(_TURN, ranges.high[k], -ranges.low[k])):
                 raise ValueError(
-                    f"{name} reads up to {most:.4g} in {where}, more than a turn in rad; say its unit: "
-                    f"--unit {name}=deg, or rad, or a range such as -100:100"
+                    f"{joint} reads up to {most:.4g} in {name}, more than a turn in rad; say its unit: "
+                    f"--unit {joint}=deg, or rad, or a range such as -100:100"
                 )
         elif unit == "deg":
             scales[k] = np.pi / 180
         elif match is not None and float(match[1]) < float(match[2]):
             if ranges is None:
-                raise ValueError(f"{name}={unit} maps onto the range of a joint of a robot; name it by --environment")
+                raise ValueError(f"{joint}={unit} maps onto the range of a joint of a robot; name it by --environment")
             scales[k] = ranges.sides[k] / (float(match[2]) - float(match[1]))
             shifts[k] = ranges.low[k] - scales[k] * float(match[1])
         elif unit != "rad":
-            raise ValueError(f"the unit of {name} must be rad, deg or a range such as -100:100, got {unit}")
+            raise ValueError(f"the unit of {joint} must be rad, deg or a range such as -100:100, got {unit}")
     return [
-        each._replace(shown=each.shown and replace(each.shown, trajectory=each.shown.trajectory * scales + shifts))
-        for each in found
+        recording._replace(
+            demonstration=recording.demonstration
+            and replace(recording.demonstration, trajectory=recording.demonstration.trajectory * scales + shifts)
+        )
+        for recording in recordings
     ]
 
 
-def paced(each: Recording, speed: float, *, trim: bool) -> Recording:
+def paced(recording: Recording, speed: float, *, trim: bool) -> Recording:
     """The recording played ``speed`` times as fast, and without the pauses at its ends if ``trim`` is true."""
-    if each.shown is None:
-        return each
-    times, joints = each.shown.times / speed, each.shown.trajectory
+    demonstration = recording.demonstration
+    if demonstration is None:
+        return recording
+    times, joints = demonstration.times / speed, demonstration.trajectory
     try:
         times, joints = moving(times, joints) if trim else (times, joints)
     except ValueError as error:
-        return each._replace(shown=None, refused=str(error))
-    return each._replace(shown=replace(each.shown, times=times, trajectory=joints))
+        return recording._replace(demonstration=None, fault=str(error))
+    return recording._replace(demonstration=replace(demonstration, times=times, trajectory=joints))
 
 
 def moving(times: Array, joints: Array) -> tuple[Array, Array]:

@@ -45,7 +45,6 @@ class FishingRod:
         outcomes: T, the task space (m); [-1, 1]^2 in the paper, [-100, 100]^2 in its large-space experiment.
         max_wind: largest force (N) of a side wind on the float, which weighs 0.2 N; 0 for no wind. The force is the
             context; without wind the context is empty.
-        line: length of the line, relative to the paper's 0.42 m; above 0 and below 2.
         threads: number of threads of ``execute_many``; None for one per core.
 
     Raises:
@@ -58,7 +57,6 @@ class FishingRod:
         noise: float = 0.032,
         outcomes: Box | None = None,
         max_wind: float = 0.0,
-        line: float = 1.0,
         threads: int | None = None,
     ) -> None:
         from sgimd_torch.environments.rod_physics import Caster  # MuJoCo is loaded only when a rod is made
@@ -66,8 +64,6 @@ class FishingRod:
         for name, value in (("noise", noise), ("max_wind", max_wind)):
             if not (np.isfinite(value) and value >= 0):
                 raise ValueError(f"{name} must be finite and >= 0, got {value}")
-        if not 0 < line < 2:
-            raise ValueError(f"line must be above 0 and below 2, got {line}; a longer line hangs in the water")
         self.noise = noise
         self.primitive = GaussianPrimitive(JOINT_RANGES, DURATIONS, sharpness=6.0)
         self.policies = self.primitive.policies
@@ -76,7 +72,7 @@ class FishingRod:
         windy = max_wind > 0
         self.contexts = Box.cube(-max_wind, max_wind, int(windy), names=("wind (N)",) * windy)
         threads = None if threads is None else check_count("threads", threads, 1)
-        self._caster = Caster(MODEL, (JOINT_RANGES.low + JOINT_RANGES.high) / 2, threads, line=line)
+        self._caster = Caster(MODEL, (JOINT_RANGES.low + JOINT_RANGES.high) / 2, threads)
         self.model = self._caster.model
         self._draws = len(self._times(DURATIONS[1] + HOLD))  # number of draws of the motor noise per joint
         self.rest = self.outcomes.check("rest, below the hanging float,", self._caster.hanging[:2].copy(), "is T in m?")

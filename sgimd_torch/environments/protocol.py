@@ -75,12 +75,30 @@ class BatchEnvironment(Environment, Protocol):
 
 
 @runtime_checkable
-class Limited(Protocol):
+class RobotCount(Protocol):
     """An environment that cannot make any number of movements at once, such as the driver of a single robot."""
 
     @property
     def at_once(self) -> int:
         """Largest number of movements at once."""
+        ...
+
+
+@runtime_checkable
+class Translating(Protocol):
+    """An environment that can translate demonstrations."""
+
+    def correspondence(self, times: Array, trajectory: Array) -> Array:
+        """theta_d ``(theta_dim,)``, eq. (6); ``times`` ``(n_times,)`` s, ``trajectory`` ``(n_times, n_joints)``."""
+        ...
+
+
+@runtime_checkable
+class Replaying(Protocol):
+    """An environment that can follow a recording sample by sample."""
+
+    def replay(self, times: Array, trajectory: Array) -> Array:
+        """``(outcome_dim,)``; ``times`` ``(n_times,)`` s from 0, ``trajectory`` ``(n_times, n_joints)``."""
         ...
 
 
@@ -104,35 +122,25 @@ class Primitive:
 
 
 @runtime_checkable
-class HasPrimitive(Protocol):
-    """An environment with a known primitive."""
-
-    @property
-    def primitive(self) -> Primitive:
-        """Primitive of this robot."""
-        ...
-
-
-@runtime_checkable
 class FromFiles(Protocol):
     """An environment that is read from files.
 
     Attributes:
         files: files whose checksums a run keeps.
         remarks: sentences for the user.
-        found: values of the options that the environment finds by movements if they are not given. A run keeps them in
-            its settings, so they are found once. The class lists the names of these options as ``FOUND``.
+        found_options: values of the options that the environment finds by movements if they are not given. A run keeps
+            them in its settings, so they are found once. ``FOUND_OPTIONS`` of the class has their names.
     """
 
     files: Sequence[Path]
     remarks: Sequence[str]
-    found: Mapping[str, Any]
+    found_options: Mapping[str, Any]
 
 
 def primitive_of(environment: Environment) -> Primitive:
     """The primitive of an environment; a `Primitive` with the defaults if the environment has none."""
-    found = environment.primitive if isinstance(environment, HasPrimitive) else None
-    return found if isinstance(found, Primitive) else Primitive()
+    primitive = getattr(environment, "primitive", None)
+    return primitive if isinstance(primitive, Primitive) else Primitive()
 
 
 FAILURES: Final = 10
@@ -198,7 +206,7 @@ def execute_many(
         outcomes = _numbers("execute_many()", environment.execute_many(contexts, thetas, rngs), len(thetas), dim)
     else:
         moved = [environment.execute(*movement) for movement in zip(contexts, thetas, rngs, strict=True)]
-        outcomes = np.stack([_numbers(f"execute() of movement {k}", each, dim) for k, each in enumerate(moved)])
+        outcomes = np.stack([_numbers(f"execute() of movement {k}", outcome, dim) for k, outcome in enumerate(moved)])
     lost = np.flatnonzero(~np.isfinite(outcomes).all(axis=1))
     if len(lost):
         raise SimulationError("the outcome is not finite", thetas[lost[0]])
@@ -264,7 +272,7 @@ def check_instance(environment: object) -> None:
     if isinstance(environment, type):
         name = environment.__name__
         raise ValueError(f"an environment is wanted, got the class {name} itself; write {name}()")
-    name, missing = type(environment).__name__, [each for each in MEMBERS if not hasattr(environment, each)]
+    name, missing = type(environment).__name__, [member for member in MEMBERS if not hasattr(environment, member)]
     if len(missing) == len(MEMBERS):
         raise ValueError(f"an environment is wanted, got a {name}; is the order of arguments right?")
     if missing:

@@ -75,11 +75,10 @@ class Caster:
         path: file of the MuJoCo model, ``fishing_rod.xml``.
         posture: ``(6,)`` rad, start posture of the arm.
         threads: number of threads that simulate several movements; None for one per core.
-        line: length and mass of the line, relative to the model in ``path``.
     """
 
-    def __init__(self, path: Path, posture: Array, threads: int | None = None, *, line: float = 1.0) -> None:
-        self.model = model = _model(path, line)
+    def __init__(self, path: Path, posture: Array, threads: int | None = None) -> None:
+        self.model = model = _damped(mujoco.MjModel.from_xml_path(str(path)))
         self.timestep = float(model.opt.timestep)
         self._gravity = -float(model.opt.gravity[2])
         self._float_mass = float(model.body("float").mass[0])
@@ -203,20 +202,6 @@ class Caster:
 def _crossing(above: Array, below: Array) -> Array:
     share = above[2] / (above[2] - below[2])
     return above[:2] + share * (below[:2] - above[:2])
-
-
-def _model(path: Path, line: float) -> mujoco.MjModel:
-    """The model in ``path``, with length and mass of each segment of the line multiplied by ``line``."""
-    if line == 1:
-        return _damped(mujoco.MjModel.from_xml_path(str(path)))
-    spec = mujoco.MjSpec.from_file(str(path))
-    for body in spec.bodies:
-        if body.name == "float" or body.name.startswith("line_"):
-            body.pos = line * body.pos
-        for geom in body.geoms:
-            if geom.name.startswith("line_"):
-                geom.fromto, geom.mass = line * geom.fromto, line * geom.mass
-    return _damped(spec.compile())
 
 
 def _damped(model: mujoco.MjModel) -> mujoco.MjModel:

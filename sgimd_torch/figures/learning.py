@@ -46,9 +46,9 @@ def landing_points(
     Returns:
         Tiles, whose array holds the number of outcomes on each, ``(n_y, n_x)``, masked where it is 0.
     """
-    shown, (x, y) = section.box, section.points(outcomes).T
-    n_tiles = np.maximum(1, np.round(shown.sides / section.tile(side))).astype(int)
-    counts, *edges = np.histogram2d(x, y, bins=n_tiles, range=np.stack((shown.low, shown.high), axis=1))
+    plane, (x, y) = section.box, section.points(outcomes).T
+    n_tiles = np.maximum(1, np.round(plane.sides / section.tile(side))).astype(int)
+    counts, *edges = np.histogram2d(x, y, bins=n_tiles, range=np.stack((plane.low, plane.high), axis=1))
     tiles = np.ma.masked_equal(counts.T, 0)
     norm = LogNorm(1, max(2, float(tiles.filled(0).max())))
     blues = ListedColormap(colormaps["Blues"](np.linspace(0.25, 1.0, 256)))  # a single outcome is visible on white, too

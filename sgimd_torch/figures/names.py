@@ -21,7 +21,6 @@ _DRAWN: Final = {
     "sgim-im-search": ("SGIM-IM, search", "#a05a2c"),
     "sgim-acts": ("SGIM-ACTS", "#cc6677"),
     "sgim-acts-search": ("SGIM-ACTS, search", "#e8a0a8"),
-    "sgim-eer": ("By entropy", "#117733"),
     "uniform-nearest": ("Standard baseline", "#44aa99"),
     "map-elites": ("MAP-Elites", "#56b4e9"),
     "map-elites-taught": ("MAP-Elites, taught", "#1f78a8"),

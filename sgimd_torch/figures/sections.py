@@ -98,8 +98,12 @@ class Section:
             ax.legend(**LEGEND)
 
     def _flat(self, points: Array, height: float) -> Array:
-        shown = np.asarray(points)[..., list(self.dims)]
-        return shown if not self.is_strip else np.concatenate([shown, np.full_like(shown, height)], axis=-1)
+        coordinates = np.asarray(points)[..., list(self.dims)]
+        return (
+            coordinates
+            if not self.is_strip
+            else np.concatenate([coordinates, np.full_like(coordinates, height)], axis=-1)
+        )
 
 
 def sections(space: Box) -> list[Section]:

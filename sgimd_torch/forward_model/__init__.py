@@ -6,7 +6,6 @@ search `GradientSearch` use this model. This folder needs torch.
 
 try:
     import lightning  # noqa: F401
-    import safetensors  # noqa: F401
     import torch  # noqa: F401
 except ImportError as error:
     raise ImportError(f"the forward model needs torch: pip install 'sgimd-torch[forward]' ({error})") from error

@@ -3,7 +3,7 @@
 Not in Nguyen & Oudeyer (2014). With one anchor k the prediction is tau_k + L(theta) - L(theta_k). With many anchors, a
 Gaussian process fitted to the network's errors at the anchors is added to L(theta); its variance grows far from
 anchors. Networks are wrong where few movements were executed; without this variance a search would end there.
-    near = Anchored(model, policies, context, ...); theta = near.descend(candidates, goals, steps=40, step=0.005)
+    near = Anchored(model, policies, context, ...); thetas = near.best(starts, goals, steps=40, step=0.005)
 """
 
 from __future__ import annotations
@@ -42,26 +42,22 @@ class Anchored:
     def __init__(
         self, model: ForwardModel, policies: Box, context: Array, contexts: Array, thetas: Array, outcomes: Array
     ) -> None:
-        self.model = model
+        self.model, self.tensor = model, model.tensor
         self.low, self.high, self.sides = map(self.tensor, (policies.low, policies.high, policies.sides))
-        self.context, thetas_there = self.tensor(context), self.tensor(thetas)
-        self._placed = thetas_there / self.sides
-        self._squares = (self._placed**2).sum(dim=-1)
+        self.context, anchors = self.tensor(context), self.tensor(thetas)
+        self._scaled = anchors / self.sides
+        self._squares = (self._scaled**2).sum(dim=-1)
         self._reach = _REACH * policies.dim**0.5
         spread = model.outcome_scale.square().mean().sqrt()
         with torch.no_grad():
-            means, variances = model.landing(self.tensor(contexts), thetas_there)
-            missed, noise = self.tensor(outcomes) - means.mean(dim=0), _SHARE * variances.mean(dim=(0, -1))
+            means, variances = model.landing(self.tensor(contexts), anchors)
+            errors, noise = self.tensor(outcomes) - means.mean(dim=0), _SHARE * variances.mean(dim=(0, -1))
             # Far from all anchors, the assumed error is at least the error on held-out exemplars.
-            doubt = (missed**2).mean(dim=(1, 2), keepdim=True).sqrt().clamp(min=model.missed * spread)
-            covariance = doubt**2 * self._kernel(torch.cdist(self._placed, self._placed) ** 2)
+            prior_sd = (errors**2).mean(dim=(1, 2), keepdim=True).sqrt().clamp(min=model.missed * spread)
+            covariance = prior_sd**2 * self._kernel(torch.cdist(self._scaled, self._scaled) ** 2)
             noise = noise + (_LEAST_NOISE * spread) ** 2
-            self._inverse = torch.cholesky_inverse(torch.linalg.cholesky(covariance + torch.diag_embed(noise)))
-            self._doubt, self._weights = doubt[:, 0] ** 2, self._inverse @ missed
-
-    def tensor(self, values: Array) -> torch.Tensor:
-        """``values`` in the precision and on the device of the model."""
-        return torch.tensor(values, dtype=torch.float32, device=self.model.input_mean.device)
+            self._precision = torch.cholesky_inverse(torch.linalg.cholesky(covariance + torch.diag_embed(noise)))
+            self._prior_variance, self._weights = prior_sd[:, 0] ** 2, self._precision @ errors
 
     def predict(self, theta: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         """Expected outcomes ``(n, outcome_dim)`` of ``theta`` ``(n, theta_dim)``, and their variances ``(n,)``: the
@@ -69,13 +65,13 @@ class Anchored:
         means, variances = self.model.landing(self.context, theta)
         landing = means.mean(dim=0)
         spread = _SHARE * (variances.mean(dim=0) + means.var(dim=0, correction=0)).sum(dim=-1)
-        placed = theta / self.sides
-        squares = (placed**2).sum(dim=-1, keepdim=True) + self._squares - 2 * (self._placed @ placed[..., None])[..., 0]
-        kernel = self._doubt * self._kernel(squares)  # (n, m)
+        scaled = theta / self.sides
+        squares = (scaled**2).sum(dim=-1, keepdim=True) + self._squares - 2 * (self._scaled @ scaled[..., None])[..., 0]
+        kernel = self._prior_variance * self._kernel(squares)  # (n, m)
         correction = (kernel[:, None] @ self._weights)[:, 0]
-        explained = ((kernel[:, None] @ self._inverse)[:, 0] * kernel).sum(dim=-1)
-        doubt = (self._doubt[:, 0] - explained).clamp(min=0)
-        return landing + correction, spread + landing.shape[-1] * _CAUTION * doubt
+        explained = ((kernel[:, None] @ self._precision)[:, 0] * kernel).sum(dim=-1)
+        variance = (self._prior_variance[:, 0] - explained).clamp(min=0)
+        return landing + correction, spread + landing.shape[-1] * _CAUTION * variance
 
     def expected(self, theta: torch.Tensor, goals: torch.Tensor) -> torch.Tensor:
         """Squared distances ``(n,)`` of expected outcomes from ``goals``, plus the variances of the outcomes."""
@@ -83,13 +79,7 @@ class Anchored:
         return ((landing - goals) ** 2).sum(dim=-1) + spread
 
     def descend(
-        self,
-        theta: torch.Tensor,
-        goals: torch.Tensor,
-        *,
-        steps: int,
-        step: float,
-        radius: float | None = None,
+        self, theta: torch.Tensor, goals: torch.Tensor, *, steps: int, step: float, radius: float | None = None
     ) -> torch.Tensor:
         """Candidates ``(n, theta_dim)`` after a descent by Adam.
 
@@ -114,6 +104,16 @@ class Anchored:
                 theta = within(start, theta, self.sides, radius)
             theta = theta.clamp(self.low, self.high)
         return theta.detach()
+
+    def best(self, starts: Array, goals: Array, *, steps: int, step: float, radius: float | None = None) -> Array:
+        """For each of the ``goals`` ``(n_goals, outcome_dim)`` the best theta ``(n_goals, theta_dim)`` of descents from
+        its ``starts`` ``(n_goals, n_starts, theta_dim)``; options of `descend`."""
+        n_goals, n_starts, theta_dim = starts.shape
+        aims = self.tensor(goals.repeat(n_starts, axis=0))
+        thetas = self.descend(self.tensor(starts.reshape(-1, theta_dim)), aims, steps=steps, step=step, radius=radius)
+        with torch.no_grad():
+            rows = self.expected(thetas, aims).reshape(n_goals, n_starts).argmin(dim=1)
+        return thetas.reshape(starts.shape)[torch.arange(n_goals), rows].cpu().double().numpy()
 
     def _kernel(self, squared_distances: torch.Tensor) -> torch.Tensor:
         return (-squared_distances / (2 * self._reach**2)).exp()

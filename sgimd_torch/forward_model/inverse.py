@@ -13,7 +13,7 @@ import numpy as np
 import torch
 
 from sgimd_torch.forward_model.anchored import Anchored
-from sgimd_torch.forward_model.shared import ThroughModel
+from sgimd_torch.forward_model.shared import ModelBased
 from sgimd_torch.inverses.locally_linear import LocallyLinear
 from sgimd_torch.options.signature import with_keywords_of
 from sgimd_torch.parts import Problem
@@ -21,13 +21,12 @@ from sgimd_torch.spaces import Array, Estimate
 
 _NEAREST: Final = 10  # number of remembered movements, nearest to the goal, at which a descent starts
 _ANCHORS: Final = 40  # number of anchors of a candidate: its neighbours in policy space
-# Number of steps, and their size relative to the sides of Pi. Many small steps end nearer to the start than few large
-# steps.
-_STEPS, _STEP = 40, 0.005
+_STEPS: Final = 40  # number of steps of a descent; many small steps end nearer to the start than few large steps
+_STEP: Final = 0.005  # size of a step, relative to the sides of Pi
 _GOALS_PER_BATCH: Final = 64  # number of goals that are computed together, in about 50 MB
 
 
-class ModelInverse(ThroughModel):
+class ModelInverse(ModelBased):
     """Best result of gradient descents through the forward model.
 
     The descents start at the estimate of `LocallyLinear` and at the nearest remembered movements. Until the model is
@@ -38,7 +37,7 @@ class ModelInverse(ThroughModel):
         problem: problem to learn.
     """
 
-    @with_keywords_of(ThroughModel)
+    @with_keywords_of(ModelBased)
     def __init__(self, problem: Problem, **options: Any) -> None:
         super().__init__(problem, **options)
         self.start = LocallyLinear(problem)
@@ -49,15 +48,15 @@ class ModelInverse(ThroughModel):
 
     def answer_many(self, contexts: Array, goals: Array) -> list[Estimate]:
         """Estimates for ``goals`` ``(n, outcome_dim)``; if all have one context, many times faster than one by one."""
-        estimates = [self.start(*each) for each in zip(contexts, goals, strict=True)]
+        estimates = self.start.answer_many(contexts, goals)
         if not self.trusted:
             return estimates
-        found: list[Estimate] = []
+        descended: list[Estimate] = []
         size = _GOALS_PER_BATCH if (contexts == contexts[0]).all() else 1
         for first in range(0, len(goals), size):
-            some = slice(first, first + size)
-            found += self._descended(contexts[first], goals[some], estimates[some])
-        return found
+            batch = slice(first, first + size)
+            descended += self._descend(contexts[first], goals[batch], estimates[batch])
+        return descended
 
     def predict_many(self, contexts: Array, thetas: Array) -> Array:
         """Expected outcomes ``(n, outcome_dim)`` by the model, corrected at similar movements.
@@ -73,30 +72,27 @@ class ModelInverse(ThroughModel):
         with torch.no_grad():
             return anchored.predict(anchored.tensor(thetas))[0].cpu().double().numpy()
 
-    def _descended(self, context: Array, goals: Array, estimates: list[Estimate]) -> list[Estimate]:
+    def _descend(self, context: Array, goals: Array, estimates: list[Estimate]) -> list[Estimate]:
         memory, policies = self.problem.memory, self.problem.policies
         starts = [
             np.vstack([estimate.theta, memory.thetas[memory.near_outcomes(context, goal, _NEAREST)]])
             for goal, estimate in zip(goals, estimates, strict=True)
         ]
-        n_each = min(map(len, starts))
-        candidates = policies.clip(np.vstack([thetas[:n_each] for thetas in starts]))
-        anchored = self._anchored(np.broadcast_to(context, (len(candidates), len(context))), candidates)
-        aims = anchored.tensor(goals.repeat(n_each, axis=0))
-        theta = anchored.descend(anchored.tensor(candidates), aims, steps=_STEPS, step=_STEP)
-        with torch.no_grad():
-            best = anchored.expected(theta, aims).reshape(len(goals), n_each).argmin(dim=1)
-        chosen = theta.reshape(len(goals), n_each, -1)[torch.arange(len(goals)), best].cpu().double().numpy()
-        return [estimate._replace(theta=policies.clip(row)) for estimate, row in zip(estimates, chosen, strict=True)]
+        n_starts = min(map(len, starts))
+        candidates = policies.clip(np.stack([thetas[:n_starts] for thetas in starts]))  # (n_goals, n_starts, theta_dim)
+        movements = candidates.reshape(-1, policies.dim)
+        anchored = self._anchored(np.broadcast_to(context, (len(movements), len(context))), movements)
+        thetas = policies.clip(anchored.best(candidates, goals, steps=_STEPS, step=_STEP))
+        return [estimate._replace(theta=theta) for estimate, theta in zip(estimates, thetas, strict=True)]
 
     def _anchored(self, contexts: Array, thetas: Array) -> Anchored:
         """Predictions for ``thetas`` ``(n, theta_dim)`` in ``contexts`` ``(n, context_dim)``, each with its own
         anchors."""
         memory = self.problem.memory
-        rows = [memory.near_policies(*each, _ANCHORS) for each in zip(contexts, thetas, strict=True)]
-        near = np.stack([row[: min(map(len, rows))] for row in rows])
-        there = memory.contexts[near], memory.thetas[near], memory.outcomes[near]
-        return Anchored(self.model, self.problem.policies, contexts, *there)
+        neighbours = [memory.near_policies(*movement, _ANCHORS) for movement in zip(contexts, thetas, strict=True)]
+        rows = np.stack([nearest[: min(map(len, neighbours))] for nearest in neighbours])
+        anchors = memory.contexts[rows], memory.thetas[rows], memory.outcomes[rows]
+        return Anchored(self.model, self.problem.policies, contexts, *anchors)
 
 
 class ModelAlone(ModelInverse):

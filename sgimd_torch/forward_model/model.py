@@ -6,21 +6,15 @@ Not in Nguyen & Oudeyer (2014), who use local models only. `OnlineTrainer` train
 
 from __future__ import annotations
 
-import json
 import math
-import os
 from collections.abc import Callable
-from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import torch
-from safetensors import SafetensorError, safe_open
-from safetensors.torch import save
 
-from sgimd_torch.files import check_regular, write_bytes
 from sgimd_torch.forward_model.ensemble import Ensemble
-from sgimd_torch.forward_model.training import OnlineTrainer
+from sgimd_torch.forward_model.training import Fit, OnlineTrainer
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, check_count, check_vector, stream
 
@@ -47,17 +41,12 @@ class Refresh(NamedTuple):
     """Result of a refresh.
 
     Attributes:
-        steps: number of steps of the optimiser.
-        held_out: negative log likelihood of the held-out exemplars after the refresh, in standardised outcomes; lower
-            is better.
-        diverged: true if training diverged and the earlier weights were restored.
+        fit: result of the training.
         first: row of the first new exemplar.
         predicted: prediction for the new exemplars by the earlier weights; None at the first refresh.
     """
 
-    steps: int
-    held_out: float
-    diverged: bool
+    fit: Fit
     first: int
     predicted: Prediction | None
 
@@ -172,8 +161,8 @@ class ForwardModel(Ensemble):
         contexts = check_vector("contexts", contexts, self.sizes["context_dim"])
         thetas = check_vector("thetas", thetas, self.sizes["theta_dim"], "were outcomes passed instead?")
         with torch.no_grad():
-            members = self.landing(self._tensor(contexts), self._tensor(thetas))
-        means, variances = (part.cpu().double().numpy() for part in members)
+            members = self.landing(self.tensor(contexts), self.tensor(thetas))
+        means, variances = (tensor.cpu().double().numpy() for tensor in members)
         return Prediction(means.mean(axis=0), means.std(axis=0), np.sqrt(variances.mean(axis=0)))
 
     def refresh(self, memory: Memory) -> Refresh | None:
@@ -200,16 +189,15 @@ class ForwardModel(Ensemble):
             return None
         if not seen and not np.ptp(memory.outcomes, axis=0).any():  # no movement has had an effect yet
             return None
-        if seen:
-            for test in self.before_learning:
-                test(memory, seen)
+        for test in self.before_learning if seen else ():
+            test(memory, seen)
         self._online.prepare()  # weights must be on the device before the exemplars
         inputs, outcomes = np.hstack([memory.contexts, memory.thetas]), memory.outcomes
         predicted = self.predict(memory.contexts[seen:], memory.thetas[seen:]) if seen else None
         if n > 2 * int(self.n_scaled):
             self._scale(inputs, outcomes)
-        x = (self._tensor(inputs) - self.input_mean) / self.input_scale
-        y = (self._tensor(outcomes) - self.outcome_mean) / self.outcome_scale
+        x = (self.tensor(inputs) - self.input_mean) / self.input_scale
+        y = (self.tensor(outcomes) - self.outcome_mean) / self.outcome_scale
         fit = self._online.fit(
             x,
             y,
@@ -219,20 +207,7 @@ class ForwardModel(Ensemble):
         )
         self.missed.fill_(fit.relative_error)
         self.n_seen.fill_(n)
-        return Refresh(fit.steps, fit.loss, fit.diverged, seen, predicted)
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write a safetensors file; its header has the dimensions of the model.
-
-        The file is written whole or not at all. The moments of the optimiser are not saved: a loaded model predicts as
-        before, but training begins with new moments.
-
-        Raises:
-            OSError: ``path`` is a directory, or cannot be written.
-        """
-        state = {name: values.cpu().contiguous() for name, values in self.state_dict().items()}
-        about = {**self.sizes, "members": self.members, "noise_heads": self.noise_heads}
-        write_bytes(path, save(state, {"model": json.dumps(about)}))
+        return Refresh(fit, seen, predicted)
 
     def _scale(self, inputs: Array, outcomes: Array) -> None:
         """Standardise inputs and outcomes anew. Predicted means do not change; predicted noise keeps its ratio to the
@@ -254,36 +229,8 @@ class ForwardModel(Ensemble):
 
     def _spread(self, values: Array) -> tuple[torch.Tensor, torch.Tensor]:
         spread = values.std(axis=0)
-        return self._tensor(values.mean(axis=0)), self._tensor(np.where(spread > 0, spread, 1.0))
+        return self.tensor(values.mean(axis=0)), self.tensor(np.where(spread > 0, spread, 1.0))
 
-    def _tensor(self, values: Array) -> torch.Tensor:
+    def tensor(self, values: Array) -> torch.Tensor:
+        """``values`` in the precision and on the device of the model."""
         return torch.tensor(values, dtype=torch.float32, device=self.input_mean.device)
-
-
-def load_forward_model(path: str | os.PathLike[str], **options: Any) -> ForwardModel:
-    """The model in a file of ``ForwardModel.save``; ``options`` are options of `ForwardModel` for training.
-
-    Raises:
-        ValueError: the file is no forward model, or truncated.
-        OSError: there is no file, or it may not be read.
-    """
-    check_regular(path)
-    Path(path).open("rb").close()  # raises the usual error of an unreadable file
-    try:
-        with safe_open(str(path), framework="pt") as file:
-            about = json.loads(file.metadata()["model"])
-            shapes = [tuple(file.get_slice(name).get_shape()) for name in ("input_mean", "outcome_mean", "weights.0")]
-            dims = (about["context_dim"] + about["theta_dim"],), (about["outcome_dim"],)
-            if shapes[:2] != [*dims] or shapes[2][:2] != (about["members"], *dims[0]):
-                raise ValueError("its dimensions are not those of its weights")
-            if {*about} != {"context_dim", "theta_dim", "outcome_dim", "members", "noise_heads"}:
-                raise ValueError("its header has other entries")
-            state = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118, it is no dict
-    except (SafetensorError, KeyError, TypeError, ValueError, RecursionError) as error:
-        raise ValueError(f"{path} is no forward model: {str(error)[:100]}; was it written by save()?") from error
-    model = ForwardModel(**{**options, **about})
-    try:
-        model.load_state_dict(state)
-    except RuntimeError as error:
-        raise ValueError(f"{path} is no forward model: its weights have other shapes or names") from error
-    return model

@@ -15,7 +15,7 @@ from typing import Any, Final
 import numpy as np
 
 from sgimd_torch.forward_model.inverse import ModelInverse
-from sgimd_torch.forward_model.shared import ThroughModel
+from sgimd_torch.forward_model.shared import ModelBased
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.memory import Memory
 from sgimd_torch.options.signature import with_keywords_of
@@ -23,15 +23,15 @@ from sgimd_torch.parts import Inverse, Problem
 from sgimd_torch.spaces import Array, Estimate
 
 _FEWEST: Final = 200  # least number of recent movements for a test
-_SUREST: Final = 10  # one in ten recent movements is compared, those with the least variance by the process
+_ONE_IN: Final = 10  # one in ten recent movements is compared, those with the least variance by the process
 # Largest accepted ratio of the errors of model and process, measured on five tasks. With noise, a model with errors a
 # tenth larger answers as well, because lucky outcomes mislead the process. Without noise it is 1 / 1.1.
-_NEARLY: Final = 1.1
-_TINY: Final = np.finfo(float).tiny
-_MOST: Final = 10.0  # largest ratio of errors; ratios are clipped to [1/10, 10]
+_RATIO: Final = 1.1
+_TINY: Final = np.finfo(float).tiny  # least error, so that a ratio of errors is finite
+_LARGEST: Final = 10.0  # largest ratio of errors; ratios are clipped to [1/10, 10]
 
 
-class ProvedModel(ThroughModel):
+class ProvedModel(ModelBased):
     """Local Gaussian process; the forward model once it predicts as well (extra forward).
 
     The answers of the forward model are those of `ModelInverse`. The test is part of ``model.refresh``, so evaluations
@@ -41,13 +41,13 @@ class ProvedModel(ThroughModel):
         problem: problem to learn.
     """
 
-    @with_keywords_of(ThroughModel)
+    @with_keywords_of(ModelBased)
     def __init__(self, problem: Problem, **options: Any) -> None:
         super().__init__(problem, **options)
-        self.process, self.through_model = LocalProcess(problem), ModelInverse(problem)
-        self._told = Memory(*problem.dims)
-        earlier = problem.over(self._told)
-        self._rivals = LocalProcess(earlier), ModelInverse(earlier)
+        self.process, self.model_inverse = LocalProcess(problem), ModelInverse(problem)
+        self._earlier = Memory(*problem.dims)
+        before = problem.over(self._earlier)
+        self._rivals = LocalProcess(before), ModelInverse(before)
         # For each movement: its row, the variance that the process predicts, and the errors of process and model.
         self._tests: list[tuple[int, float, float, float]] = []
         self._proved = False
@@ -73,21 +73,21 @@ class ProvedModel(ThroughModel):
 
     @property
     def _better(self) -> Inverse:
-        return self.through_model if self.trusted else self.process
+        return self.model_inverse if self.trusted else self.process
 
     def _test(self, memory: Memory, learnt: int) -> None:
         """Test model and process, which know the first ``learnt`` movements, on the later movements."""
-        for row in range(len(self._told), learnt):
-            self._told.add(memory.contexts[row], memory.thetas[row], memory.outcomes[row])
-        process, through_model = self._rivals
+        for row in range(len(self._earlier), learnt):
+            self._earlier.add(memory.contexts[row], memory.thetas[row], memory.outcomes[row])
+        process, model_inverse = self._rivals
         new = slice(learnt, len(memory))
         contexts, thetas, outcomes = memory.contexts[new], memory.thetas[new], memory.outcomes[new]
-        by_process = [process.predict_variance(*each) for each in zip(contexts, thetas, strict=True)]
-        by_model = through_model.predict_many(contexts, thetas)
-        for row, (one, other, outcome) in enumerate(zip(by_process, by_model, outcomes, strict=True), learnt):
-            if one is not None:
-                expected, variance = one
-                self._tests.append((row, variance, math.dist(expected, outcome), math.dist(other, outcome)))
+        by_process = map(process.predict_variance, contexts, thetas)
+        by_model = model_inverse.predict_many(contexts, thetas)
+        for row, (prediction, landing, outcome) in enumerate(zip(by_process, by_model, outcomes, strict=True), learnt):
+            if prediction is not None:
+                expected, variance = prediction
+                self._tests.append((row, variance, math.dist(expected, outcome), math.dist(landing, outcome)))
         self._proved = self._is_nearly_as_good(len(memory))
 
     def _is_nearly_as_good(self, n: int) -> bool:
@@ -95,7 +95,7 @@ class ProvedModel(ThroughModel):
         recent = np.array([test for row, *test in self._tests if row >= n / 2])
         if len(recent) < _FEWEST:
             return False
-        _, by_process, by_model = recent[recent[:, 0].argsort(kind="stable")[: len(recent) // _SUREST]].T
-        times = np.maximum(by_model, _TINY) / np.maximum(by_process, _TINY)
-        limit = _NEARLY if self.process.noise > 0 else 1 / _NEARLY
-        return bool(np.log(times.clip(1 / _MOST, _MOST)).mean() <= math.log(limit))
+        _, by_process, by_model = recent[recent[:, 0].argsort(kind="stable")[: len(recent) // _ONE_IN]].T
+        ratios = np.maximum(by_model, _TINY) / np.maximum(by_process, _TINY)
+        limit = _RATIO if self.process.noise > 0 else 1 / _RATIO
+        return bool(np.log(ratios.clip(1 / _LARGEST, _LARGEST)).mean() <= math.log(limit))

@@ -14,15 +14,17 @@ import numpy as np
 import torch
 
 from sgimd_torch.forward_model.anchored import Anchored
-from sgimd_torch.forward_model.shared import is_asked, model_of
+from sgimd_torch.forward_model.shared import model_of, uses_model
 from sgimd_torch.parts import Problem, Search
 from sgimd_torch.searches.simplex import NelderMead
 from sgimd_torch.spaces import Array, Estimate
 
 _CANDIDATES: Final = 5  # number of remembered movements to start from
-_STEPS, _STEP = 5, 0.03  # number of steps of a descent, and their size relative to the sides of Pi
+_STEPS: Final = 5  # number of steps of a descent
+_STEP: Final = 0.03  # size of a step, relative to the sides of Pi
 _RADIUS: Final = 0.15  # first radius of the trust region, relative to the sides of Pi (root mean square)
-_RADII: Final = (0.02, 0.3)  # bounds of the radius: smaller steps are lost in the noise, larger ones leave the anchors
+_LEAST_RADIUS: Final = 0.02  # smaller steps are lost in the noise
+_GREATEST_RADIUS: Final = 0.3  # larger steps leave the anchors
 
 
 class GradientSearch(Search):
@@ -50,7 +52,7 @@ class GradientSearch(Search):
 
     def __call__(self, start: Estimate, goal: Array) -> Generator[Array, Array, None]:
         """Movements near ``start``; each depends on the outcomes of earlier ones."""
-        if not is_asked(self.problem.inverse, self.model):
+        if not uses_model(self.problem.inverse, self.model):
             yield from self._simplex(start, goal)
             return
         policies = self.problem.policies
@@ -61,22 +63,15 @@ class GradientSearch(Search):
             contexts = np.broadcast_to(start.context, (1, len(thetas), len(start.context)))
             # All candidates share these anchors, which count as if executed in the context of the goal.
             anchored = Anchored(self.model, policies, start.context, contexts, thetas[None], outcomes[None])
-            theta = _best(anchored, np.vstack([first, thetas[nearest]]), goal, radius)
+            starts = np.vstack([first, thetas[nearest]])[None]
+            theta = anchored.best(starts, goal[None], steps=_STEPS, step=_STEP, radius=radius)[0]
             theta = policies.clip(self.rng.normal(theta, self.noise * policies.sides) if self.noise else theta)
             with torch.no_grad():
                 predicted = anchored.predict(anchored.tensor(theta[None]))[0][0].cpu().double().numpy()
             outcome = yield theta
             misfit, change = math.dist(predicted, outcome), math.dist(predicted, outcomes[nearest[0]])
             if misfit < 0.5 * change:
-                radius = min(radius * 1.5, _RADII[1])
+                radius = min(radius * 1.5, _GREATEST_RADIUS)
             elif misfit > change:
-                radius = max(radius / 2, _RADII[0])
+                radius = max(radius / 2, _LEAST_RADIUS)
             thetas, outcomes, first = np.vstack([thetas, theta]), np.vstack([outcomes, outcome]), first[:0]
-
-
-def _best(anchored: Anchored, starts: Array, goal: Array, radius: float) -> Array:
-    """The best result ``(theta_dim,)`` of descents from ``starts`` on the expected squared distance."""
-    aim = anchored.tensor(goal[None])
-    found = anchored.descend(anchored.tensor(starts), aim, steps=_STEPS, step=_STEP, radius=radius)
-    with torch.no_grad():
-        return found[anchored.expected(found, aim).argmin()].cpu().double().numpy()

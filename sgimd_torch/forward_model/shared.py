@@ -1,19 +1,29 @@
-"""One forward model for all parts of a learner: the inverse model, the search and the listener of a run.
+"""One forward model for all parts of a learner, and its place in a run: training, records of its predictions, messages.
 
-model = model_of(problem, members=5); model_of(problem) is model
+    model = model_of(problem, members=5); model_of(problem) is model
+A replay writes the tables of the record again, so the tables of a resumed run are complete.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import Any, Final
 
-from sgimd_torch.forward_model.listener import ModelListener
-from sgimd_torch.forward_model.model import ForwardModel, Refresh
+import numpy as np
+from scipy.special import gammaincinv
+
+from sgimd_torch.forward_model.model import ForwardModel, Prediction, Refresh
 from sgimd_torch.memory import Memory
 from sgimd_torch.options.signature import with_keywords_of
 from sgimd_torch.parts import Inverse, Problem, Trained
-from sgimd_torch.runs.run import RunLoop
+from sgimd_torch.record import Record
+from sgimd_torch.runs.run import Listener, RunLoop, Seconds
+from sgimd_torch.runs.signals import say
+from sgimd_torch.spaces import Array, Episode
+
+LEVEL: Final = 0.8  # share of outcomes that the predicted regions should contain, for the board's model/coverage
+NOT_USED: Final = "the forward model is not used, the learner goes on without it"
 
 
 class SharedModel(Trained):
@@ -31,11 +41,11 @@ class SharedModel(Trained):
         """Result of `ForwardModel.refresh`."""
         return self.model.refresh(memory)
 
-    def listener(self, life: RunLoop) -> ModelListener:
+    def listener(self, loop: RunLoop) -> ModelListener:
         """Listener that refreshes the model in a run."""
-        learner = life.parts.learner
-        asked = partial(is_asked, learner.inverse, self.model)
-        return ModelListener(life.record, self.model, asked, learner.memory, life.seconds)
+        learner = loop.parts.learner
+        asked = partial(uses_model, learner.inverse, self.model)
+        return ModelListener(loop.record, self.model, asked, learner.memory, loop.seconds)
 
 
 @with_keywords_of(ForwardModel, "members", "rate", "noise_heads", "accelerator", "trust")
@@ -44,7 +54,7 @@ def model_of(problem: Problem, **options: Any) -> ForwardModel:
     return problem.shared(SharedModel, partial(SharedModel, problem, **options)).model
 
 
-class ThroughModel(Inverse):
+class ModelBased(Inverse):
     """Inverse model that uses the forward model of its problem if the forward model can be trusted.
 
     Attributes:
@@ -64,6 +74,90 @@ class ThroughModel(Inverse):
         return self.model.trusted
 
 
-def is_asked(inverse: Inverse, model: ForwardModel) -> bool:
-    """Whether a learner with this ``inverse`` uses the ``model`` now; a `ThroughModel` has its own ``trusted``."""
-    return inverse.trusted if isinstance(inverse, ThroughModel) else model.trusted
+def uses_model(inverse: Inverse, model: ForwardModel) -> bool:
+    """Whether a learner with this ``inverse`` uses the ``model`` now; a `ModelBased` has its own ``trusted``."""
+    return inverse.trusted if isinstance(inverse, ModelBased) else model.trusted
+
+
+class ModelListener(Listener):
+    """Refreshes the model after every movement and records its predictions.
+
+    Args:
+        record: record of the run.
+        model: forward model of the run.
+        asked: function that returns whether the learner uses the model now.
+        memory: memory of the learner.
+        seconds: clock of the run; it includes the training during a replay.
+    """
+
+    def __init__(
+        self, record: Record, model: ForwardModel, asked: Callable[[], bool], memory: Memory, seconds: Seconds
+    ) -> None:
+        self._record, self._model, self._memory, self._seconds = record, model, memory, seconds
+        self._uses_model, self._asked = asked, False
+        self._curves: dict[str, float] = {}
+
+    def episode(self, episode: Episode, replayed: bool) -> None:
+        """Refresh the model after a movement; print a message if its use begins or ends, or its training diverges."""
+        memory, movements = self._memory, episode.index + 1
+        with self._seconds.of("model"):
+            refresh = self._model.refresh(memory)
+        if refresh is None:
+            return
+        error = self._model.relative_error
+        fit = refresh.fit
+        row = movements, len(memory), fit.steps, fit.loss, error, int(fit.diverged)
+        self._record.add_rows("refreshes", [row])
+        self._curves = {"model/relative_error": error, "model/held_out": fit.loss, "model/steps": fit.steps}
+        if refresh.predicted is not None:
+            self._predicted(refresh.first, memory.outcomes[refresh.first :], refresh.predicted)
+        news = ["training diverged; the forward model keeps its last good weights"] if fit.diverged else []
+        asked = self._uses_model()
+        if asked != self._asked:
+            self._asked = asked
+            who = "the forward model is used from here on" if asked else NOT_USED
+            news.append(f"{who}: {self._how_wrong(error)}")
+        if not replayed:
+            say(*(f"movement {movements}: {message}" for message in news))
+
+    def close(self) -> None:
+        """Print a message if the model is not used."""
+        if not self._asked:
+            trained = self._model.trained
+            why = self._how_wrong(self._model.relative_error) if trained else "there were too few exemplars to train it"
+            say(f"{NOT_USED}: {why}")
+
+    def curves(self) -> dict[str, float]:
+        """Numbers of the last refresh by tag of the board; empty if they were read before."""
+        curves, self._curves = self._curves, {}
+        return curves
+
+    def _predicted(self, first: int, outcomes: Array, predicted: Prediction) -> None:
+        values = np.hstack((outcomes, *predicted)).tolist()
+        self._record.add_rows("predictions", ((row, *columns) for row, columns in enumerate(values, first)))
+        spread = np.hypot(predicted.epistemic, predicted.aleatoric)
+        self._curves["model/error"] = float(np.linalg.norm(outcomes - predicted.mean, axis=1).mean())
+        self._curves["model/coverage"] = coverage(outcomes, predicted.mean, spread, LEVEL)
+
+    def _how_wrong(self, error: float) -> str:
+        unproved = not self._asked and self._model.trusted
+        proof = ", once it predicts movements as well as a local process" if unproved else ""
+        return f"its relative error is {error:.3f}, it is trusted up to {self._model.trust:g}{proof}"
+
+
+def coverage(observed: Array, mean: Array, spread: Array, level: float) -> float:
+    """Share of the outcomes that lie in their predicted regions, which should contain the share ``level``.
+
+    The regions are ellipsoids, because the predictions are Gaussians with independent dimensions. A share below
+    ``level`` means that the predicted standard deviations are too small, a share above that they are too large.
+    Predictions must be made before the model learns from the outcomes (prequential analysis: Dawid, J. R. Stat. Soc. A
+    147, 1984), because on its training exemplars any model looks good.
+
+    Args:
+        observed: ``(n, outcome_dim)`` outcomes, n >= 1.
+        mean: ``(n, outcome_dim)`` predicted outcomes.
+        spread: ``(n, outcome_dim)`` standard deviations > 0, epistemic and aleatoric together.
+        level: share between 0 and 1.
+    """
+    squared = (((observed - mean) / spread) ** 2).sum(axis=1)
+    return float((squared <= 2 * gammaincinv(observed.shape[1] / 2, level)).mean())  # a quantile of chi-square

@@ -18,7 +18,7 @@ from sgimd_torch.forward_model.ensemble import Ensemble, nll
 _RECENT: Final = 0.25  # share of every batch that is drawn from the newest exemplars
 _BATCH: Final = 128  # number of exemplars in a step, for each member
 _HELD_OUT_EVERY: Final = 10  # every tenth exemplar is held out, that is, never trained on
-_STEPS_PER_LOOK: Final = 20  # number of optimiser steps between two tests on the held-out exemplars
+_STEPS_PER_TEST: Final = 20  # number of optimiser steps between two tests on the held-out exemplars
 _PATIENCE: Final = 5  # number of tests without improvement after which a fit ends
 
 
@@ -27,7 +27,7 @@ class Fit(NamedTuple):
 
     Attributes:
         steps: number of steps of the optimiser.
-        loss: negative log likelihood of the held-out exemplars.
+        loss: negative log likelihood of the held-out exemplars, in standardised outcomes; lower is better.
         relative_error: error of predictions for the held-out exemplars, see `ForwardModel.relative_error`.
         diverged: true if the fit diverged and the earlier weights were restored.
     """
@@ -82,33 +82,33 @@ class OnlineTrainer:
         is_held = torch.arange(len(x)) % _HELD_OUT_EVERY == _HELD_OUT_EVERY - 1
         rows = torch.nonzero(~is_held)[:, 0]
         before = {name: values.clone() for name, values in self.ensemble.state_dict().items()}
-        best, waited, done = math.inf, 0, 0
+        best_loss, n_waited, n_done = math.inf, 0, 0
         try:
-            while done < steps and waited < _PATIENCE:
-                n_steps = min(_STEPS_PER_LOOK, steps - done)
+            while n_done < steps and n_waited < _PATIENCE:
+                n_steps = min(_STEPS_PER_TEST, steps - n_done)
                 for _ in range(n_steps):
-                    picked = self._draw(rows)
+                    drawn = self._draw(rows)
                     self.optimizer.zero_grad()
-                    fabric.backward(self.ensemble.training_step((x[picked], y[picked])))
+                    fabric.backward(self.ensemble.training_step((x[drawn], y[drawn])))
                     self.optimizer.step()
-                done += n_steps
-                loss, error = self.judge(x[is_held], y[is_held], scale)
+                n_done += n_steps
+                loss, error = self.score(x[is_held], y[is_held], scale)
                 if not (math.isfinite(loss) and error <= give_up):
                     self._restore(before)
-                    return Fit(done, *self.judge(x[is_held], y[is_held], scale), diverged=True)
-                best, waited = (loss, 0) if loss < best else (best, waited + 1)
+                    return Fit(n_done, *self.score(x[is_held], y[is_held], scale), diverged=True)
+                best_loss, n_waited = (loss, 0) if loss < best_loss else (best_loss, n_waited + 1)
         except BaseException:
             self._restore(before)
             raise
-        return Fit(done, loss, error, diverged=False)
+        return Fit(n_done, loss, error, diverged=False)
 
-    def judge(self, x: torch.Tensor, y: torch.Tensor, scale: torch.Tensor) -> tuple[float, float]:
+    def score(self, x: torch.Tensor, y: torch.Tensor, scale: torch.Tensor) -> tuple[float, float]:
         """Two numbers: the mean negative log likelihood of the members; and the error of their mean prediction, divided
         by the error of always predicting the mean of ``y``."""
         with torch.no_grad():
             mean, log_variance = self.ensemble(x)
-            length = scale * torch.stack([mean.mean(dim=0) - y, y.mean(dim=0) - y])
-            error = torch.div(*length.norm(dim=-1).mean(dim=-1).clamp(min=torch.finfo().tiny))
+            lengths = scale * torch.stack([mean.mean(dim=0) - y, y.mean(dim=0) - y])
+            error = torch.div(*lengths.norm(dim=-1).mean(dim=-1).clamp(min=torch.finfo().tiny))
             return float(nll(mean, log_variance, y).mean()), float(error)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -118,9 +118,9 @@ class OnlineTrainer:
     def _draw(self, rows: torch.Tensor) -> torch.Tensor:
         """Random rows ``(members, batch)``; the first quarter of each batch is drawn from the newest exemplars."""
         members, recent, n_recent = self.ensemble.members, rows[-self.newest :], round(_RECENT * _BATCH)
-        picked = rows[torch.randint(len(rows), (members, _BATCH), generator=self.generator)]
-        picked[:, :n_recent] = recent[torch.randint(len(recent), (members, n_recent), generator=self.generator)]
-        return picked
+        drawn = rows[torch.randint(len(rows), (members, _BATCH), generator=self.generator)]
+        drawn[:, :n_recent] = recent[torch.randint(len(recent), (members, n_recent), generator=self.generator)]
+        return drawn
 
     def _restore(self, weights: dict[str, torch.Tensor]) -> None:
         """Restore these weights, with a new optimiser, because the old moments belong to other weights."""

@@ -14,8 +14,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sgimd_torch.goals.regions import Progress, Region, between_interests, gained_progress, interest_of
-from sgimd_torch.goals.tiling import Tiling
+from sgimd_torch.goals.regions import Progress, Region, Tiling, between_interests, gained_progress, interest_of
 from sgimd_torch.parts import Goals, Problem
 from sgimd_torch.spaces import Array
 
@@ -37,8 +36,8 @@ class InterestMap(Goals):
         max_aspect: ratio of two sides of a region, relative to C x T, beyond which the shorter side is not cut.
             Deviation: the paper has no such rule (inf). Without it, regions become very thin when most goals lie in a
             small part of a large space.
-        progress: measure of progress: `gained_progress`; `absolute_progress`, which is eq. (3); `paired_progress`; or a
-            function of your own.
+        progress: measure of progress: `gained_progress`; `absolute_progress`, which is eq. (3); or a function of
+            your own.
         contrast: function (region, mask of the goals below a cut) -> difference between the two sides of the cut.
 
     Raises:
@@ -118,9 +117,9 @@ class InterestMap(Goals):
         cuts = np.quantile(region.points, np.arange(1, self.cuts + 1) / (self.cuts + 1), axis=0)  # (cuts, dim)
         is_below = region.points[:, None] < cuts  # (n, cuts, dim)
         n_below = is_below.sum(axis=0)
-        few = np.minimum(n_below, n - n_below) < self.g_max / 20
-        thin = np.minimum(cuts - region.low, region.high - cuts) < _MIN_SIDE * side
-        valid, shares = ~few & ~thin, side / self._tiling.box.sides
+        is_sparse = np.minimum(n_below, n - n_below) < self.g_max / 20
+        is_thin = np.minimum(cuts - region.low, region.high - cuts) < _MIN_SIDE * side
+        valid, shares = ~is_sparse & ~is_thin, side / self._tiling.box.sides
         valid &= shares * self.max_aspect >= shares.max(where=valid.any(axis=0), initial=0.0)
 
         def score(candidate: tuple[int, int]) -> tuple[float, float, int]:

@@ -20,15 +20,17 @@ from sgimd_torch.parts import Problem
 from sgimd_torch.spaces import Array
 
 _FIRST: Final = 21  # least number of exemplars that determine a box; with fewer, goals are uniform in T
-_MOST_COMPARED, _GROWTH = 1000, 1.05  # largest number of such exemplars; growth of the memory from one box to the next
-_ALIKE: Final = 5  # number of similar movements whose mean outcome counts; fewer while the memory is small
+_SAMPLED: Final = 1000  # largest number of exemplars from which the box is computed
+_GROWTH: Final = 1.05  # factor by which the memory grows from one box to the next
+_SIMILAR: Final = 5  # number of similar movements whose mean outcome counts; fewer while the memory is small
 _TAIL: Final = 0.02  # share of the mean outcomes that is left out at each end of a dimension
-_NARROWEST, _WIDEST = 0.02, 0.2  # bounds of the step, relative to the box's longest side; at first the step is wider
+_NARROWEST: Final = 0.02  # least width of the step, relative to the box's longest side
+_WIDEST: Final = 0.2  # greatest width of the step after the first exemplars
 _WIDE_FOR: Final = 250  # number of exemplars up to which the step stays wide
-_FACTOR: Final = 1.4  # factor of the step after a met goal outside the box; after a missed goal 1.4^(-1/3)
-_MEDIAN: Final = 1.1  # factor by which the running median rises after a larger error, and falls after a smaller one
+_FACTOR: Final = 1.4  # factor of the step after a met goal outside the box; 1.4^(-1/3) after a missed one
+_MEDIAN_FACTOR: Final = 1.1  # factor of the running median after a larger error; after a smaller one 1 / 1.1
 _ROUNDING: Final = 1e-9  # largest spread of outcomes that counts as none, relative to the longest side of T
-_MOST: Final = 0.7  # geometric mean of the box's sides, relative to T's, from which on goals are uniform in T
+_ALL_OF_T: Final = 0.7  # geometric mean of the box's sides, relative to T's, from which on goals are uniform in T
 
 
 class WithinReach(UniformGoals):
@@ -46,9 +48,10 @@ class WithinReach(UniformGoals):
 
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)
-        self._reach: Array | None = None  # (2, outcome_dim), the box; None while all outcomes are equal
-        self._step, self._n_updated = _WIDEST, 0  # width of the step; number of exemplars when the box was computed
-        self._missed = 0.0  # running median of the errors of goals in the box
+        self._box: Array | None = None  # (2, outcome_dim), the box; None while all outcomes are equal
+        self._step = _WIDEST  # width of the step outside the box, relative to the box's longest side
+        self._n_updated = 0  # number of exemplars when the box was computed
+        self._median_error = 0.0  # running median of the errors of goals in the box
         self._all_of_t = False  # whether T is hardly larger than the box with its widest step
 
     def sample(self, context: ArrayLike) -> Array:
@@ -60,10 +63,10 @@ class WithinReach(UniformGoals):
         goal, space = super().sample(context), self.problem.outcomes
         n = len(self.problem.memory)
         if n >= max(_FIRST, _GROWTH * self._n_updated):
-            self._update()
-        if self._reach is None or self._all_of_t or self.problem.inverse.effects() is not None:
+            self._update_box()
+        if self._box is None or self._all_of_t or self.problem.inverse.effects() is not None:
             return goal
-        low, high = self._around(self._reach, self._step)
+        low, high = self._around(self._box, self._step)
         moved: Array = low + (goal - space.low) / space.sides * (high - low)
         return moved
 
@@ -76,36 +79,36 @@ class WithinReach(UniformGoals):
             ValueError: see `Goals.add`.
         """
         super().add(context, goal, competence, strategy, gain)
-        if self._reach is None:
+        if self._box is None:
             return
-        goal, (low, high) = np.asarray(goal, dtype=np.float64), self._reach
+        goal, (low, high) = np.asarray(goal, dtype=np.float64), self._box
         beyond = math.dist(goal, np.minimum(np.maximum(goal, low), high))
-        missed = math.dist(goal, self.problem.memory.outcomes[-1])
+        error = math.dist(goal, self.problem.memory.outcomes[-1])
         if beyond == 0:
-            median = self._missed or missed
-            self._missed = median * _MEDIAN if missed > median else median / _MEDIAN
+            median = self._median_error or error
+            self._median_error = median * _MEDIAN_FACTOR if error > median else median / _MEDIAN_FACTOR
         elif len(self.problem.memory) >= _WIDE_FOR:
-            met = missed < max(beyond, self._missed)
-            step = self._step * _FACTOR if met else self._step / _FACTOR ** (1 / 3)
+            is_met = error < max(beyond, self._median_error)
+            step = self._step * _FACTOR if is_met else self._step / _FACTOR ** (1 / 3)
             self._step = min(max(step, _NARROWEST), _WIDEST)
 
-    def _update(self) -> None:
+    def _update_box(self) -> None:
         """Update the box."""
         memory, space = self.problem.memory, self.problem.outcomes
         n = self._n_updated = len(memory)
-        rows = np.arange(0, n, 1 + n // _MOST_COMPARED)
-        alike = memory.neighbourhoods(rows, min(_ALIKE, n // _FIRST))
-        means = memory.outcomes[alike].mean(axis=1)
-        reach = np.quantile(means, (_TAIL, 1 - _TAIL), axis=0)
-        if np.ptp(reach, axis=0).max() > _ROUNDING * space.sides.max():
-            self._reach = reach
-        if self._reach is not None:
-            low, high = self._around(self._reach, _WIDEST)
+        rows = np.arange(0, n, 1 + n // _SAMPLED)
+        similar = memory.neighbourhoods(rows, min(_SIMILAR, n // _FIRST))
+        means = memory.outcomes[similar].mean(axis=1)
+        box = np.quantile(means, (_TAIL, 1 - _TAIL), axis=0)
+        if np.ptp(box, axis=0).max() > _ROUNDING * space.sides.max():
+            self._box = box
+        if self._box is not None:
+            low, high = self._around(self._box, _WIDEST)
             share = np.prod((high - low) / space.sides) ** (1 / space.dim)
-            self._all_of_t = bool(share >= _MOST)
+            self._all_of_t = bool(share >= _ALL_OF_T)
 
-    def _around(self, reach: Array, step: float) -> tuple[Array, Array]:
+    def _around(self, box: Array, step: float) -> tuple[Array, Array]:
         """Low and high corners of the box that is widened by the step, within T."""
-        low, high = reach
+        low, high = box
         beyond = max(step, _FIRST / self._n_updated) * float((high - low).max())
         return self.problem.outcomes.clip(low - beyond), self.problem.outcomes.clip(high + beyond)

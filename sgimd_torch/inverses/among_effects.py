@@ -7,10 +7,10 @@ outcome does not depend on theta. One process for both kinds of movements would 
 
 from __future__ import annotations
 
-from sgimd_torch.explore.effects import Effects
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.memory import Memory
 from sgimd_torch.parts import Inverse, Problem
+from sgimd_torch.searches.effects import Effects
 from sgimd_torch.spaces import Array, Estimate
 
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any, NoReturn, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -79,77 +79,50 @@ class Learner:
         self.watcher: Watcher | None = None
         self.changes: list[Change] = []
         self._life: list[tuple[int, int] | Event] = []  # events; for a movement, its row in memory and its place
-        self._places = [RobotSlot(0)]
-        self._new: list[RobotSlot] = []  # places whose attempt no event has reported so far, in order of beginning
-        self._asked: list[
-            tuple[RobotSlot, Move | Failure | None]
-        ] = []  # what was asked for last and is not told so far
+        self._slots = [RobotSlot(0)]
+        self._new: list[RobotSlot] = []  # slots whose attempt no event has reported so far, in order of beginning
+        self._asked: list[tuple[RobotSlot, Move | Failure | None]] = []  # what was asked for and is not told so far
         self._lessons: set[tuple[bytes, bytes]] = set()
 
     @property
     def idle(self) -> bool:
         """Whether no attempt is under way; then the next ``ask`` begins one, in any context."""
-        return all(each.attempt is None for each in self._places)
-
-    @property
-    def lesson_waits(self) -> bool:
-        """Whether an offered demonstration is still unanswered; a continued `run` then asks for no other one."""
-        return self.lesson_waits_at(0)
+        return all(slot.attempt is None for slot in self._slots)
 
     def lesson_waits_at(self, place: int) -> bool:
         """Whether the demonstration that was offered to the robot at ``place`` is still unanswered."""
-        return self._place(place).offered_at == self.movements
+        return self._slot(place).offered_at == self.movements
 
     @property
     def regions(self) -> Sequence[Any]:
         """Current regions of the goal model; none if it has no regions."""
         return self.autonomous.regions
 
-    @property
-    def waits_for_answer(self) -> bool:
-        """Whether the learner has asked for a demonstration and has no reply yet."""
-        return any(each.request is not None for each in self._places)
-
-    @property
-    def context(self) -> Array:
-        """Context ``(context_dim,)`` of the attempt under way, read-only.
-
-        Raises:
-            RuntimeError: no attempt is under way.
-        """
-        context = self.context_at(0)
-        if context is None:
-            raise RuntimeError("no attempt is under way, so the context may be any; see idle")
-        return context
-
     def context_at(self, place: int) -> Array | None:
         """Context of the attempt under way at ``place``, read-only; None: the next attempt there may have any."""
-        here = self._place(place)
-        return None if here.attempt is None else here.context
+        slot = self._slot(place)
+        return None if slot.attempt is None else slot.context
 
     def events(self) -> Iterator[Event]:
         """All events so far, in order; movements lack goal and origin."""
         memory = self.memory
-        for each in self._life:
-            if not isinstance(each, Event):
-                row, place = each
+        for entry in self._life:
+            if isinstance(entry, Event):
+                yield entry
+            else:
+                row, place = entry
                 context, theta, outcome = memory.contexts[row], memory.thetas[row], memory.outcomes[row]
-                each = Event(Kind.MOVED, context, theta, outcome=outcome, place=place)
-            yield each
-        yield from self._begun([place for place, move in self._asked if not isinstance(move, Failure)])
+                yield Event(Kind.MOVED, context, theta, outcome=outcome, place=place)
+        yield from self._begun([slot for slot, move in self._asked if not isinstance(move, Failure)])
+
+    def __reduce__(self) -> NoReturn:
+        raise TypeError(
+            "a learner cannot be copied or pickled, as an attempt under way is a generator; save_life(learner, path), "
+            "then load_life(new, path) into a learner built in the same way"
+        )
 
     def ask(self, context: ArrayLike) -> Move | None:
-        """The next movement, or None, which is a rest: there is no outcome to tell.
-
-        Args:
-            context: ``(context_dim,)``, the context of the movement. An attempt keeps its context until the learner is
-                ``idle``.
-
-        Raises:
-            RuntimeError: the outcome of the last movement was not told, or the context changed during an attempt.
-            ValueError: the context has another shape or is not finite, or a part has proposed a theta that is no point
-                of Pi.
-        """
+        """The next movement, or None, which is a rest: there is no outcome to tell. See `ask_many`."""
         (move,) = self.ask_many([context])
         if move is None:
             self.tell_many([None])
@@ -177,15 +150,17 @@ class Learner:
         if not len(contexts):
             raise ValueError("ask_many() needs a context for each robot, got none")
         dim = self.memory.context_dim
-        seen = [each if isinstance(each, Failure) else check_point("context", each, dim) for each in contexts]
+        seen = [
+            context if isinstance(context, Failure) else check_point("context", context, dim) for context in contexts
+        ]
         for number, context in enumerate(seen):
             under_way = self.context_at(number)
             other = under_way is not None and not isinstance(context, Failure) and (context != under_way).any()
             if other:
                 raise RuntimeError(f"the attempt under way began in context {under_way}, got {context}; see idle")
-        asked = [(place, self._propose(place, context)) for place, context in zip(self._places, seen, strict=False)]
-        self._asked = asked
-        return [move if isinstance(move, Move) else None for _, move in asked]
+        slots = [self._slot(number) for number in range(len(seen))]
+        self._asked = [(slot, self._propose(slot, context)) for slot, context in zip(slots, seen, strict=True)]
+        return [move if isinstance(move, Move) else None for _, move in self._asked]
 
     def request(self, context: ArrayLike, *, place: int = 0) -> Request | None:
         """The request to a teacher before the next movement, or None. `watch` replies with a demonstration; after
@@ -199,10 +174,10 @@ class Learner:
             ValueError: the context has another shape, or is not finite.
         """
         context = check_point("context", context, self.memory.context_dim)
-        here = self._place(place)
-        if here.attempt is None:
-            self._begin(here, context)
-        return here.request
+        slot = self._slot(place)
+        if slot.attempt is None:
+            self._begin(slot, context)
+        return slot.request
 
     def go_on_alone(self, reply: str, *, place: int = 0) -> None:
         """Tell the learner that its request gets no demonstration.
@@ -214,25 +189,16 @@ class Learner:
         Raises:
             RuntimeError: the learner has made no request.
         """
-        here = self._place(place)
-        if here.request is None:
+        slot = self._slot(place)
+        if slot.request is None:
             raise RuntimeError("go_on_alone() needs a request, but request() has given none")
-        asked = here.asked(here.request, reply)
-        here.advance(None)
-        self._report_new(here)
+        asked = slot.asked(slot.request, reply)
+        slot.advance(None)
+        self._report_new(slot)
         self._publish(asked)
 
     def tell(self, outcome: ArrayLike) -> None:
-        """Tell the outcome of the movement from `ask`; it enters the memory.
-
-        Args:
-            outcome: ``(outcome_dim,)``.
-
-        Raises:
-            RuntimeError: `ask` has given no movement.
-            ValueError: the outcome has another shape, is not finite or is beyond 1e100. Nothing is remembered, and the
-                learner still waits for an outcome.
-        """
+        """Tell the outcome ``(outcome_dim,)`` of the movement from `ask`; it enters the memory. See `tell_many`."""
         self.tell_many([outcome])
 
     def tell_many(self, outcomes: Sequence[ArrayLike | Failure | None]) -> None:
@@ -253,21 +219,21 @@ class Learner:
         if len(outcomes) != len(asked):
             raise ValueError(f"tell_many() needs {len(asked)} outcomes, one for each movement, got {len(outcomes)}")
         told = [self._checked(move, outcome) for (_, move), outcome in zip(asked, outcomes, strict=True)]
-        moves = [move if isinstance(move, Move) else None for _, move in asked]
-        # A failure without a movement leaves no trace of the attempt, so its beginning is reported by itself.
-        no_attempt_begun = [move is None and isinstance(each, Failure) for move, each in zip(moves, told, strict=True)]
-        self._report_new(*(place for (place, _), each in zip(asked, no_attempt_begun, strict=True) if not each))
+        # A rest that fails leaves no trace of its attempt, so the beginning of the attempt is reported by itself.
+        pairs = zip(asked, told, strict=True)
+        traced = [slot for (slot, move), outcome in pairs if isinstance(move, Move) or outcome is None]
+        self._report_new(*traced)
         self._asked = []
-        for (place, _), move, outcome in zip(asked, moves, told, strict=True):
-            self._tell(place, move, outcome)
+        for (slot, move), outcome in zip(asked, told, strict=True):
+            self._tell(slot, move if isinstance(move, Move) else None, outcome)
         self._restart_if_changed()
 
     def replace_theta(self, theta: Array, *, place: int = 0) -> None:
         """Replace the movement that is asked for at ``place`` by the recorded ``theta``, which equals it but for
         rounding. Only a replay does this: the memory then holds what was executed."""
-        here, move = self._asked[place]
+        slot, move = self._asked[place]
         assert isinstance(move, Move)
-        self._asked[place] = here, replace(move, theta=theta)
+        self._asked[place] = slot, replace(move, theta=theta)
 
     def watch(self, demonstration: Demonstration, *, who: str | None = None, place: int = 0) -> None:
         """Watch a demonstration. A requested demonstration goes to the attempt that requested it. Any other
@@ -275,8 +241,8 @@ class Learner:
 
         Args:
             demonstration: demonstration that is shown.
-            who: name of the teacher whose offers a `run` checks before each movement, see ``lesson_waits``; None:
-                the demonstration comes from somebody else.
+            who: name of the teacher whose offers a `run` checks before each movement, see `lesson_waits_at`; None: the
+                demonstration comes from somebody else.
             place: number of the robot that uses the demonstration; attempts of other robots go on.
 
         Raises:
@@ -284,24 +250,24 @@ class Learner:
             ValueError: the demonstration does not fit the spaces or the correspondence, or theta_d lies outside Pi;
                 the learner is unchanged.
         """
-        here = self._place(place)
-        if self.social is None and here.request is None:
+        slot = self._slot(place)
+        if self.social is None and slot.request is None:
             raise RuntimeError("this learner has no social strategy, so it cannot be taught; use no teacher")
         if self._asked:
             raise RuntimeError("watch() needs the outcome of the last movement first; was tell() forgotten?")
         theta_d = self.translate(demonstration)
         self._lessons.add(_lesson(demonstration, theta_d))
-        if here.request is not None:
-            asked, who = here.asked(here.request, "shown"), here.request.teacher
-            here.advance(Lesson(theta_d, demonstration))
-            self._report_new(here)
+        if slot.request is not None:
+            asked, who = slot.asked(slot.request, "shown"), slot.request.teacher
+            slot.advance(Lesson(theta_d, demonstration))
+            self._report_new(slot)
             self._publish(asked)
         elif self.social is not None:
             self._report_new()
-            here.end()
-            here.offered_at = -1 if who is None else self.movements
+            slot.end()
+            slot.offered_at = -1 if who is None else self.movements
             context = np.asarray(demonstration.context, dtype=np.float64)
-            here.begin(self.social.attempt(context, theta_d, demonstration), context)
+            slot.begin(self.social.attempt(context, theta_d, demonstration), context)
         self._publish(Event(Kind.SHOWN, lesson=demonstration, who=who, place=place))
 
     def add(self, context: ArrayLike, theta: ArrayLike, outcome: ArrayLike) -> None:
@@ -360,41 +326,41 @@ class Learner:
     def interrupt(self) -> None:
         """End all attempts under way; their movements so far count. Outcomes that were not told are no longer
         expected."""
-        asked, self._asked = [each for each in self._asked if not isinstance(each[1], Failure)], []
+        asked, self._asked = [(slot, move) for slot, move in self._asked if not isinstance(move, Failure)], []
         if self.idle:
             return
-        self._report_new(*(place for place, _ in asked))
+        self._report_new(*(slot for slot, _ in asked))
         stopped = [
-            place.moved(Kind.INTERRUPTED, move)
-            if isinstance(move, Move)
-            else Event(Kind.INTERRUPTED, place.context, place=place.number)
-            for place, move in asked
+            Event(Kind.INTERRUPTED, slot.context, place=slot.number)
+            if move is None
+            else slot.moved(Kind.INTERRUPTED, move)
+            for slot, move in asked
         ]
-        for place in self._places:
-            place.end()
+        for slot in self._slots:
+            slot.end()
         self._publish(*(stopped or [Event(Kind.INTERRUPTED, place=-1)]))
 
-    def _place(self, number: int) -> RobotSlot:
-        while len(self._places) <= number:
-            self._places.append(RobotSlot(len(self._places)))
-        return self._places[number]
+    def _slot(self, number: int) -> RobotSlot:
+        while len(self._slots) <= number:
+            self._slots.append(RobotSlot(len(self._slots)))
+        return self._slots[number]
 
-    def _begin(self, place: RobotSlot, context: Array) -> None:
+    def _begin(self, slot: RobotSlot, context: Array) -> None:
         context = read_only(context)
-        self._new.append(place)
-        place.begin(self.autonomous.attempt(context), context)
+        self._new.append(slot)
+        slot.begin(self.autonomous.attempt(context), context)
 
-    def _propose(self, place: RobotSlot, context: Array | Failure) -> Move | Failure | None:
-        """The next movement at a place; a new attempt begins if none is under way there."""
+    def _propose(self, slot: RobotSlot, context: Array | Failure) -> Move | Failure | None:
+        """The next movement of a robot; a new attempt begins if none is under way tslot."""
         if isinstance(context, Failure):
             return context
         for _ in range(2):  # the attempt under way may end with a request that gets no reply
-            if place.attempt is None:
-                self._begin(place, context)
-            while place.request is not None:
-                self.go_on_alone("nothing", place=place.number)
-            if place.attempt is not None:
-                return self._within_pi(place.move)
+            if slot.attempt is None:
+                self._begin(slot, context)
+            while slot.request is not None:
+                self.go_on_alone("nothing", place=slot.number)
+            if slot.attempt is not None:
+                return self._within_pi(slot.move)
         raise RuntimeError(f"{type(self.autonomous).__name__}.attempt() has to yield at least once")
 
     def _within_pi(self, move: Move | None) -> Move | None:
@@ -418,23 +384,23 @@ class Learner:
             raise ValueError(f"a movement has an outcome or a Failure, a rest has None; got {outcome} for {move}")
         return move
 
-    def _tell(self, place: RobotSlot, move: Move | None, outcome: Array | Failure | None) -> None:
-        """Tell what came of the movement at one place, after its check."""
+    def _tell(self, slot: RobotSlot, move: Move | None, outcome: Array | Failure | None) -> None:
+        """Tell what came of the movement of one robot, after its check."""
         self.movements += 1
         if isinstance(outcome, Failure):
-            lost = Event(Kind.FAILED, reply=outcome.reason, place=place.number)
-            failed = lost if move is None else place.moved(Kind.FAILED, move, reply=outcome.reason)
-            place.end()
+            lost = Event(Kind.FAILED, reply=outcome.reason, place=slot.number)
+            failed = lost if move is None else slot.moved(Kind.FAILED, move, reply=outcome.reason)
+            slot.end()
             self._publish(failed)
         elif move is None or outcome is None:
-            place.advance(None)
-            self._publish(Event(Kind.RESTED, place.context, place=place.number))
+            slot.advance(None)
+            self._publish(Event(Kind.RESTED, slot.context, place=slot.number))
         else:
-            assert place.context is not None
-            self._remember(place.context, move.theta, outcome)
+            assert slot.context is not None
+            self._remember(slot.context, move.theta, outcome)
             row = len(self.memory) - 1
-            moved = place.moved(Kind.MOVED, move, self.memory.outcomes[-1])
-            place.advance(moved.outcome)
+            moved = slot.moved(Kind.MOVED, move, self.memory.outcomes[-1])
+            slot.advance(moved.outcome)
             self._publish(moved, row=row)
 
     def _remember(self, context: Array, theta: Array, outcome: Array) -> None:
@@ -446,12 +412,12 @@ class Learner:
 
     def _restart_if_changed(self) -> None:
         """Begin again if the robot has changed: attempts end, and all parts are built anew."""
-        found = None if self.watcher is None else self.watcher.restart_if_changed()
-        if found is None:
+        restart = None if self.watcher is None else self.watcher.restart_if_changed()
+        if restart is None:
             return
-        for place in self._places:
-            place.end()
-        new, change = found
+        for slot in self._slots:
+            slot.end()
+        new, change = restart
         self.problem, self.inverse, self.autonomous, self.social = new.problem, new.inverse, new.autonomous, new.social
         if change is not None:
             self.changes.append(change)
@@ -464,17 +430,17 @@ class Learner:
                 listener(event)
 
     def _report_new(self, *reported: RobotSlot) -> None:
-        """Publish the beginnings of new attempts, unless the next events, at the places ``reported``, tell them."""
+        """Publish the beginnings of new attempts, unless the next events, of the slots ``reported``, tell them."""
         begun, self._new = self._begun(reported), []
         self._publish(*begun)
 
     def _begun(self, reported: Sequence[RobotSlot]) -> list[Event]:
-        """Events of all new attempts; none if events at the places ``reported`` tell all of them in their order.
+        """Events of all new attempts; none if events of the slots ``reported`` tell all of them in their order.
 
         A replay begins attempts in the order of the events, so that each draws the same random numbers again.
         """
-        in_order = self._new == [each for each in reported if each in self._new]
-        return [] if in_order else [each.begun() for each in self._new]
+        in_order = self._new == [slot for slot in reported if slot in self._new]
+        return [] if in_order else [Event(Kind.ASKED, slot.context, place=slot.number) for slot in self._new]
 
 
 def _lesson(demonstration: Demonstration, theta_d: Array) -> tuple[bytes, bytes]:

@@ -1,4 +1,4 @@
-"""A place of a learner: the attempt that goes on there. Robot k of several robots that move at once has place k."""
+"""A slot of a learner for each of several robots that move at once: the attempt of this robot."""
 
 from __future__ import annotations
 
@@ -57,10 +57,6 @@ class RobotSlot:
             self.attempt.close()
         self.attempt = self.next = None
         self.offered_at = -1
-
-    def begun(self) -> Event:
-        """Event of an attempt that has begun; a replay needs it if no other event reports the attempt."""
-        return Event(Kind.ASKED, self.context, place=self.number)
 
     def asked(self, request: Request, reply: str) -> Event:
         """Event of a request and its reply."""

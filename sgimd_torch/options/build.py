@@ -6,21 +6,21 @@ parts = build(Config(seed=3)); for episode in run(parts.learner, parts.environme
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 from sgimd_torch.changes import check_watcher
 from sgimd_torch.environments.protocol import Environment, FromFiles
 from sgimd_torch.evaluation import Benchmark
-from sgimd_torch.files import checksum
 from sgimd_torch.learner import Learner
-from sgimd_torch.options.catalogue import call_checked, function_of, load_word
-from sgimd_torch.options.config import ALGORITHM, OWN, Config
+from sgimd_torch.options.built import call_checked
+from sgimd_torch.options.catalogue import function_of, load_word
+from sgimd_torch.options.config import FILES, OWN, Config
 from sgimd_torch.parts import Demonstrator, Inverse, Teacher
 from sgimd_torch.runs.at_once import check_at_once
 from sgimd_torch.runs.tasks import Task, benchmark_of
-from sgimd_torch.spaces import Demonstration, stream
+from sgimd_torch.spaces import stream
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +55,12 @@ class RunParts:
     @property
     def inverses(self) -> dict[str, Inverse]:
         """Inverse models for evaluations, by name, the run's own first; after a change of the robot they are others."""
-        return _inverses(self.config, self.learner)
+        learner, inverses = self.learner, {OWN: self.learner.inverse}
+        for word in self.config.evaluated_by[1:]:
+            make = partial(Inverse.of, load_word("inverse", word), learner.problem)
+            learnt_with = self.config.values.get("inverse") == word
+            inverses[word] = learner.inverse if learnt_with else learner.problem.shared(f"answer {word}", make)
+        return inverses
 
 
 def build(config: Config) -> RunParts:
@@ -66,60 +71,47 @@ def build(config: Config) -> RunParts:
         FileNotFoundError: a file does not exist.
     """
     task = task_of(config)
-    config = with_found(config, task.environment)
-    check_at_once(task.environment, config.at_once)
-    benchmark, notes, benchmark_crc32 = benchmark_of(task, config.benchmark)
-    shown: dict[str, Any] = {}
-    teacher: Teacher | None = None
-    teachers: dict[str, Demonstrator] = {}
-    demonstrations_crc32 = None
-    if config.teaching:
-        from sgimd_torch.runs.tasks.taught import correspondence_of, demonstrations_of  # not for learners alone
+    robot, readers = task.environment, dict[str, Callable[..., Any]](benchmark=benchmark_of)
+    config = config.with_found(robot.found_options if isinstance(robot, FromFiles) else {})
+    check_at_once(robot, config.at_once)
+    own = [config.constructor("teacher")] if config.teaching == "teacher" else []
+    asked = {word: load_word("teachers", word) for word in config.asked}
+    if any(map(_needs_demonstrations, (*own, *asked.values()))):
+        from sgimd_torch.runs.tasks.taught import demonstrations_of  # not for learners alone
 
-        asked = (config.teachers or ("all",)) if config.teaching == "teachers" else ()
-        makers = {word: load_word("teachers", word) for word in asked}
-        own = [config.constructor("teacher")] if "teacher" in config else []
-        demonstrations: Sequence[Demonstration] = []
-        if any(map(_needs_demonstrations, (*makers.values(), *own))):
-            demonstrations, about_them, demonstrations_crc32 = demonstrations_of(task, config.demonstrations)
-            notes += about_them
-        shown["correspondence"] = correspondence_of(task)
-        for make in own:
-            teacher = Teacher.of(make, demonstrations, stream(config.seed, "teacher"))
-        for word, make in makers.items():
-            teachers[word] = Demonstrator.of(make, demonstrations, stream(config.seed, f"teacher {word}"))
-        if teachers:
-            shown["teachers"] = teachers
-    begin_with_crc32 = None
+        readers["demonstrations"] = demonstrations_of
     if config.begin_with is not None:
         from sgimd_torch.runs.past import past_of  # few runs begin with a past
 
-        shown["prior"] = past_of(config.begin_with, task.environment)
-        notes = [*notes, f"begins with {len(shown['prior'])} movements of {config.begin_with}, as far as they help"]
-        begin_with_crc32 = checksum(config.begin_with)
+        readers["begin_with"] = past_of
+    contents, notes = dict[str, Any](), list[str]()
+    data: dict[str, str | None] = {f"{name}_crc32": None for name in FILES}
+    for name, read in readers.items():
+        contents[name], remarks, data[f"{name}_crc32"] = read(task, config[name])
+        notes += remarks
+    given: dict[str, Any] = {"prior": contents["begin_with"]} if "begin_with" in contents else {}
+    teacher, teachers = None, dict[str, Demonstrator]()
+    if config.teaching:
+        from sgimd_torch.runs.tasks.taught import correspondence_of
+
+        shown, given["correspondence"] = contents.get("demonstrations", ()), correspondence_of(task)
+        for make in own:
+            teacher = Teacher.of(make, shown, stream(config.seed, "teacher"))
+        for word, make in asked.items():
+            teachers[word] = Demonstrator.of(make, shown, stream(config.seed, f"teacher {word}"))
+        given |= {"teachers": teachers} if teachers else {}
     algorithm = f"algorithm {config.algorithm}"
-    learner = call_checked(algorithm, config.constructor(ALGORITHM), task.environment, config.seed, **shown)
+    learner = call_checked(algorithm, config.constructor("algorithm"), robot, config.seed, **given)
     if not isinstance(learner, Learner):
         raise ValueError(f"{algorithm} must return a Learner, got a {type(learner).__name__}")
     if config.until is not None and not learner.inverse.says_how_sure:
         name = type(learner.inverse).__name__
         raise ValueError(f"--until needs an inverse model that says how sure it is, such as process; {name} does not")
-    _inverses(config, learner)  # made now, so that their remarks are among the notes
-    check_watcher(learner)  # an answer may have a forward model
-    return RunParts(
-        config=config,
-        task=task,
-        learner=learner,
-        teacher=teacher,
-        teachers=teachers,
-        benchmark=benchmark,
-        data={
-            "demonstrations_crc32": demonstrations_crc32,
-            "benchmark_crc32": benchmark_crc32,
-            "begin_with_crc32": begin_with_crc32,
-        },
-        notes=[*notes, *learner.problem.remarks],
-    )
+    parts = RunParts(config, task, learner, teacher, teachers, contents["benchmark"], data, notes)
+    assert parts.inverses  # made here, so that their remarks are among the notes
+    check_watcher(learner)  # an inverse model of the evaluations may have a forward model
+    notes += learner.problem.remarks
+    return parts
 
 
 def task_of(config: Config) -> Task:
@@ -130,23 +122,6 @@ def task_of(config: Config) -> Task:
     """
     task = call_checked(f"environment {config['environment']}", config.constructor("environment"))
     return task if isinstance(task, Task) else Task(task)
-
-
-def _inverses(config: Config, learner: Learner) -> dict[str, Inverse]:
-    problem, found = learner.problem, {OWN: learner.inverse}
-    for word in config.evaluated_by[1:]:
-        make = partial(Inverse.of, load_word("inverse", word), problem)
-        learnt_with = config.values.get("inverse") == word
-        found[word] = learner.inverse if learnt_with else problem.shared(f"answer {word}", make)
-    return found
-
-
-def with_found(config: Config, robot: Environment) -> Config:
-    """The settings, with the options that the robot found by movements, such as the corners of T."""
-    found = {
-        f"environment.{name}": value for name, value in (robot.found if isinstance(robot, FromFiles) else {}).items()
-    }
-    return replace(config, parts={**dict(config.parts), **{name: found[name] for name in found if name in config}})
 
 
 def _needs_demonstrations(make: Callable[..., Any]) -> bool:

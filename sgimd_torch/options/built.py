@@ -1,11 +1,13 @@
-"""Building parts from constructors: ``Goals.of(make, problem)`` explains each mistake in a user's constructor."""
+"""Calls of constructors, which may be a user's code: ``Goals.of(make, problem)`` explains each mistake in one."""
 
 from __future__ import annotations
 
+import inspect
 from abc import ABC
+from collections.abc import Callable
 from typing import Any, Self
 
-from sgimd_torch.options.catalogue import call_checked, function_of, place_of
+from sgimd_torch.options.catalogue import function_of, place_of
 
 
 class Built(ABC):  # noqa: B024
@@ -28,8 +30,24 @@ class Built(ABC):  # noqa: B024
         name = function_of(make).__name__
         if missing := getattr(function_of(make), "__abstractmethods__", ()):
             raise ValueError(f"{name} has no {', '.join(sorted(missing))}, which every {kind} must have")
-        made: Any = call_checked(f"{kind} {name}", make, *given)
-        if not isinstance(made, cls):
+        part: Any = call_checked(f"{kind} {name}", make, *given)
+        if not isinstance(part, cls):
             wanted = f"derive a class from {kind} of sgimd_torch.parts"
-            raise ValueError(f"{name} must make a {kind}, made a {type(made).__name__}; {wanted}")
-        return made
+            raise ValueError(f"{name} must make a {kind}, made a {type(part).__name__}; {wanted}")
+        return part
+
+
+def call_checked(what: str, make: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
+    """Result of a call of ``make``, which may be code of a user.
+
+    Raises:
+        ValueError: ``make`` takes other arguments, or it ends the program.
+    """
+    try:
+        inspect.signature(make).bind(*arguments, **options)
+    except TypeError as error:
+        raise ValueError(f"{what} cannot be called with the arguments of its kind: {error}") from error
+    try:
+        return make(*arguments, **options)
+    except SystemExit as end:  # SystemExit would end the command, which would look successful
+        raise ValueError(f"{what} cannot be made: it calls exit({end})") from end

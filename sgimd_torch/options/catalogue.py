@@ -1,155 +1,81 @@
 """The catalogue: every name that the command line knows, with the place of its class, function or module.
 
-    load_word("goals", "grid")                    # ProgressGrid, which is imported now
+    load_word("goals", "interest-map")            # InterestMap, which is imported now
     load_word("goals", "mypackage.goals:Curious") # a class of your own
-To remove a feature, delete its folder and its lines of this table. The help text of a name is the first line of the
+To remove a feature, delete its folder and its lines of the table. The help text of a name is the first line of the
 docstring at its place. The options are keywords of the signature there (`sgimd_torch.options.signature`).
 """
 
 from __future__ import annotations
 
-import ast
 import importlib
-import inspect
 import os
+import re
 import sys
 from collections.abc import Callable, Collection, Iterable
 from difflib import get_close_matches
 from functools import cache, partial
-from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
 ROD: Final = "fishing-rod"
-WORDS: Final[dict[str, dict[str, str]]] = {
-    "algorithm": {
-        "random": "algorithms.paper:random_exploration",
-        "sagg-riac": "algorithms.paper:sagg_riac",
-        "practice": "algorithms.practice:practice",
-        "practice-taught": "algorithms.practice:practice_taught",
-        "observation": "algorithms.paper:observation",
-        "imitation": "algorithms.paper:imitation",
-        "sgim-d": "algorithms.paper:sgim_d",
-        "sgim-im": "asking.algorithms:sgim_im",
-        "sgim-im-search": "asking.algorithms:sgim_im_search",
-        "sgim-acts": "asking.algorithms:sgim_acts",
-        "sgim-acts-search": "asking.algorithms:sgim_acts_search",
-        "sgim-eer": "asking.algorithms:sgim_eer",
-        "map-elites": "rivals.quality_diversity:map_elites_alone",
-        "map-elites-taught": "rivals.quality_diversity:map_elites",
-        "isoline": "rivals.quality_diversity:isoline_alone",
-        "isoline-taught": "rivals.quality_diversity:isoline",
-        "cma-me": "rivals.quality_diversity:cma_me_alone",
-        "cma-me-taught": "rivals.quality_diversity:cma_me",
-        "cma-mae": "rivals.quality_diversity:cma_mae_alone",
-        "cma-mae-taught": "rivals.quality_diversity:cma_mae",
-    },
-    "environment": {
-        ROD: "runs.tasks.rods:fishing_rod",
-        "rod-wind": "runs.tasks.rods:rod_wind",
-        "rod-long": "runs.tasks.rods:rod_long",
-        "planar-arm-7": "runs.tasks.robots:planar_arm_7",
-        "planar-arm-50": "runs.tasks.robots:planar_arm_50",
-        "swimmer": "runs.tasks.robots:swimmer",
-        "half-reached": "runs.tasks.robots:half_reached",
-        "toss": "runs.tasks.toys:toss",
-        "crawler": "runs.tasks.toys:crawler",
-        "two-elbows": "runs.tasks.toys:two_elbows",
-        "spatial-arm": "runs.tasks.toys:spatial_arm",
-        "puck": "runs.tasks.toys:puck",
-        "fetch": "runs.tasks.toys:fetch",
-        "mujoco": "environments.mujoco_robot:MujocoRobot",
-    },
-    "goals": {
-        "interest-map": "goals.interest_map:InterestMap",
-        "grid": "goals.progress_grid:ProgressGrid",
-        "alp-gmm": "rivals.alp_gmm:AlpGmm",
-        "uniform": "goals.uniform:UniformGoals",
-        "within-reach": "goals.within_reach:WithinReach",
-        "strategic": "asking.interest:StrategicInterest",
-        "entropy": "asking.entropy:EntropyGoals",
-    },
-    "progress": {
-        "gained": "goals.regions:gained_progress",
-        "absolute": "goals.regions:absolute_progress",
-        "paired": "goals.regions:paired_progress",
-    },
-    "search": {
-        "nelder-mead": "searches.simplex:NelderMead",
-        "perturb": "searches.perturb:Perturb",
-        "vary": "searches.perturb:Vary",
-        "cma-es": "rivals.cma_es:CmaEs",
-        "gradient": "forward_model.search:GradientSearch",
-    },
-    "explore": {
-        "anywhere": "explore.anywhere:Anywhere",
-        "widening": "explore.widening:Widening",
-        "returning": "explore.returning:Returning",
-    },
-    "inverse": {
-        "linear": "inverses.locally_linear:LocallyLinear",
-        "paper": "inverses.local:LocalInverse",
-        "nearest": "inverses.nearest:NearestNeighbour",
-        "process": "inverses.local_process:LocalProcess",
-        "among-effects": "inverses.among_effects:AmongEffects",
-        "model": "forward_model.proved:ProvedModel",
-        "model-alone": "forward_model.inverse:ModelAlone",
-    },
-    "judge": {
-        "memory": "competence:Competence",
-        "attempt": "competence:AttemptCompetence",
-    },
-    "social": {
-        "imitate": "strategies:Imitate",
-        "emulate": "strategies:Emulate",
-    },
-    "teacher": {
-        "periodic": "teachers:PeriodicTeacher",
-        "initial": "teachers:InitialTeacher",
-        "at-once": "teachers:at_once",
-        "asked": "teachers:AskedTeacher",
-        "by-hand": "teach.by_hand:ByHand",
-    },
-    "choose": {
-        "least-explored": "teachers:least_explored",
-        "random": "teachers:at_random",
-    },
-    "teachers": {
-        "all": "asking.teachers:AnsweringTeacher",
-        "demonstrator-1": "asking.teachers:demonstrator_1",
-        "demonstrator-2": "asking.teachers:demonstrator_2",
-        "demonstrator-3": "asking.teachers:demonstrator_3",
-        "low-half": "asking.teachers:low_half_teacher",
-        "high-half": "asking.teachers:high_half_teacher",
-        "mislabelling": "asking.teachers:mislabelling",
-        "slow": "asking.teachers:slow",
-    },
-    "command": {
-        "run": "options.command_line",
-        "sweep": "runs.sweep",
-        "check": "views.check",
-        "demonstrations": "views.demonstrations",
-        "suite": "views.suite",
-        "benchmark": "views.benchmark",
-        "table": "views.table",
-        "report": "views.report.command",
-        "teach": "teach.command",
-        "film": "views.film.command",
-        "ask": "views.ask",
-        "demo": "views.demo",
-    },
-}
+_TABLE: Final = """
+algorithm    algorithms.paper           random=random_exploration sagg-riac observation imitation sgim-d
+algorithm    algorithms.practice        practice practice-taught
+algorithm    asking.algorithms          sgim-im sgim-im-search sgim-acts sgim-acts-search
+algorithm    rivals.quality_diversity   map-elites=map_elites_alone map-elites-taught=map_elites isoline=isoline_alone
+algorithm    rivals.quality_diversity   isoline-taught=isoline cma-me=cma_me_alone cma-me-taught=cma_me
+algorithm    rivals.quality_diversity   cma-mae=cma_mae_alone cma-mae-taught=cma_mae
+environment  runs.tasks.robots          fishing-rod planar-arm-7 planar-arm-50
+environment  environments.mujoco_robot  mujoco=MujocoRobot
+goals        goals.interest_map         interest-map=InterestMap
+goals        rivals.alp_gmm             alp-gmm=AlpGmm
+goals        goals.uniform              uniform=UniformGoals
+goals        goals.within_reach         within-reach=WithinReach
+goals        asking.interest            strategic=StrategicInterest
+progress     goals.regions              gained=gained_progress absolute=absolute_progress
+search       searches.simplex           nelder-mead=NelderMead
+search       searches.perturb           perturb=Perturb vary=Vary
+search       rivals.cma_es              cma-es=CmaEs
+search       forward_model.search       gradient=GradientSearch
+explore      searches.explore           anywhere=Anywhere widening=Widening returning=Returning
+inverse      inverses.locally_linear    linear=LocallyLinear
+inverse      inverses.local             paper=LocalInverse
+inverse      inverses.nearest           nearest=NearestNeighbour
+inverse      inverses.local_process     process=LocalProcess
+inverse      inverses.among_effects     among-effects=AmongEffects
+inverse      forward_model.proved       model=ProvedModel
+inverse      forward_model.inverse      model-alone=ModelAlone
+judge        competence                 memory=Competence attempt=AttemptCompetence
+social       strategies                 imitate=Imitate emulate=Emulate
+teacher      teachers                   periodic=PeriodicTeacher initial=InitialTeacher at-once asked=AskedTeacher
+teacher      teach.by_hand              by-hand=ByHand
+choose       teachers                   least-explored random=at_random
+teachers     asking.teachers            all=AnsweringTeacher demonstrator-1 demonstrator-2 demonstrator-3
+teachers     asking.teachers            low-half=low_half_teacher high-half=high_half_teacher
+command      options.command_line       run
+command      runs.sweep                 sweep
+command      views.check                check
+command      views.demonstrations       demonstrations
+command      views.benchmark            benchmark
+command      views.table                table
+command      views.report.command       report
+command      teach.command              teach
+command      views.film.command         film
+command      views.ask                  ask
+command      views.demo                 demo
+"""
+WORDS: Final[dict[str, dict[str, str]]] = {line.split()[0]: {} for line in _TABLE.strip().splitlines()}
+"""Place of each name, by kind; in ``_TABLE`` a line has the kind, a module, and names of its members."""
+for _kind, _module, *_names in map(str.split, _TABLE.strip().splitlines()):
+    for _name, _, _member in (name.partition("=") for name in _names):
+        WORDS[_kind][_name] = _module if _kind == "command" else f"{_module}:{_member or _name.replace('-', '_')}"
 # Default teacher of each taught algorithm; "teachers": the algorithm asks teachers. Other algorithms learn alone.
 TAUGHT_BY: Final = {
     **dict.fromkeys(("observation", "imitation", "sgim-d"), "periodic"),
     **dict.fromkeys((word for word in WORDS["algorithm"] if word.endswith("-taught")), "periodic"),
     "practice-taught": "at-once",
     **dict.fromkeys((word for word, at in WORDS["algorithm"].items() if at.startswith("asking.")), "teachers"),
-}
-# The extra of the package that each of these commands needs.
-EXTRAS: Final = {
-    **dict.fromkeys(("demonstrations", "suite", "demo"), "plot"),
-    **{name: name for name in ("report", "teach", "film")},
 }
 _PACKAGE: Final = Path(__file__).parents[1]
 PLACES: Final = {f"{_PACKAGE.name}.{at}" for words in WORDS.values() for at in words.values()}
@@ -187,26 +113,25 @@ def load_word(kind: str, word: str) -> Callable[..., Any]:
         ValueError: there is none, its module cannot be imported, or it cannot be called; the message says why.
     """
     module, _, name = place_of(kind, word).partition(":")
-    what = f"{kind} {word}"
+    what, folder = f"{kind} {word}", os.getcwd()
     if module.endswith(".py"):
         raise ValueError(f"{what}: write the module without .py and with dots, {module[:-3].replace('/', '.')}:{name}")
-    here = os.getcwd()
-    if here not in sys.path:
-        sys.path.append(here)
+    if folder not in sys.path:
+        sys.path.append(folder)
     try:
-        found = importlib.import_module(module)
+        loaded = importlib.import_module(module)
     except (Exception, SystemExit) as error:  # a user's module may raise anything
         if isinstance(error, ImportError) and word in WORDS[kind]:
             raise ValueError(str(error)) from error  # it names the extra that installs what is missing
-        where = f"; is it installed, or in {here}?" if isinstance(error, ImportError) else ""
+        where = f"; is it installed, or in {folder}?" if isinstance(error, ImportError) else ""
         why = f"{type(error).__name__}: {error}{where}"
         raise ValueError(f"{what}: the module {module} cannot be imported: {why}") from error
-    if not hasattr(found, name):
-        raise ValueError(f"{what}: {module} has no {name}{did_you_mean(name, dir(found), 3)}")
-    made: Callable[..., Any] = getattr(found, name)
-    if not callable(made):
-        raise ValueError(f"{what} must be a class or a function, got a {type(made).__name__}")
-    return made
+    if not hasattr(loaded, name):
+        raise ValueError(f"{what}: {module} has no {name}{did_you_mean(name, dir(loaded), 3)}")
+    make: Callable[..., Any] = getattr(loaded, name)
+    if not callable(make):
+        raise ValueError(f"{what} must be a class or a function, got a {type(make).__name__}")
+    return make
 
 
 @cache
@@ -214,35 +139,15 @@ def about(kind: str, word: str) -> str:
     """Help text of a name of the catalogue: the first line of its docstring, read without importing the module."""
     module, _, name = WORDS[kind][word].partition(":")
     path = _PACKAGE / module.replace(".", "/")
-    tree = ast.parse((path / "__init__.py" if path.is_dir() else path.with_suffix(".py")).read_text(encoding="utf-8"))
-    found = ast.get_docstring(tree) if not name else None
-    for node, after in pairwise((*tree.body, ast.Pass())):
-        if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name == name:
-            found = ast.get_docstring(node)
-        elif isinstance(node, ast.Assign) and isinstance(after, ast.Expr) and ast.unparse(node.targets[0]) == name:
-            found = ast.literal_eval(after.value)
-    return (found or "").partition("\n")[0].rstrip(".")
+    source = (path / "__init__.py" if path.is_dir() else path.with_suffix(".py")).read_text(encoding="utf-8")
+    begin = rf"^(?:(?:class|def) {name}\b|{name} = )" if name else r"\A"
+    described = re.search(begin + r'.*?"""(.*?)\.?(?:"""|\n)', source, re.DOTALL | re.MULTILINE)
+    return described[1] if described else ""
 
 
-def function_of(made: Callable[..., Any]) -> Callable[..., Any]:
+def function_of(make: Callable[..., Any]) -> Callable[..., Any]:
     """The function or class inside of any ``partial``."""
-    return function_of(made.func) if isinstance(made, partial) else made
-
-
-def call_checked(what: str, make: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
-    """Result of a call of ``make``, which may be code of a user.
-
-    Raises:
-        ValueError: ``make`` takes other arguments, or it ends the program.
-    """
-    try:
-        inspect.signature(make).bind(*arguments, **options)
-    except TypeError as error:
-        raise ValueError(f"{what} cannot be called with the arguments of its kind: {error}") from error
-    try:
-        return make(*arguments, **options)
-    except SystemExit as end:  # SystemExit would end the command, which would look successful
-        raise ValueError(f"{what} cannot be made: it calls exit({end})") from end
+    return function_of(make.func) if isinstance(make, partial) else make
 
 
 def unknown(what: str, word: str, known: Collection[str], also: str = "") -> ValueError:
@@ -252,7 +157,7 @@ def unknown(what: str, word: str, known: Collection[str], also: str = "") -> Val
 
 
 def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:
-    """A question such as ``; did you mean grid?`` with at most ``most`` similar names; empty if no name is similar."""
-    spelt = {each.lower().replace("_", "-"): each for each in known}
-    near = get_close_matches(name.lower().replace("_", "-"), spelt, most, 0.5)
-    return f"; did you mean {' or '.join(spelt[each] for each in near)}?" if near else ""
+    """A question such as ``; did you mean vary?`` with at most ``most`` similar names; empty if no name is similar."""
+    spellings = {word.lower().replace("_", "-"): word for word in known}
+    near = get_close_matches(name.lower().replace("_", "-"), spellings, most, 0.5)
+    return f"; did you mean {' or '.join(spellings[word] for word in near)}?" if near else ""

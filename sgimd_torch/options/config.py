@@ -1,7 +1,7 @@
 """Settings of a run: options of the run itself, its parts, and options of the parts.
 
 Defaults are those of the library, so a run with one changed option is an ablation.
-    config = Config(algorithm="sagg-riac", parts={"goals": "grid", "goals.window": 12}); config["search.noise"]
+    config = Config(algorithm="sagg-riac", parts={"goals.window": 12}); config["search.noise"]
 Options of a part are the keywords of its signature (`sgimd_torch.options.signature`). A keyword that is called like a
 kind of the catalogue, such as ``goals``, chooses another part.
 """
@@ -12,27 +12,19 @@ import importlib.util
 import json
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, Final, NamedTuple, Self
 
-from sgimd_torch.options.catalogue import PLACES, ROD, TAUGHT_BY, WORDS, did_you_mean, load_word, place_of, word_of
-from sgimd_torch.options.signature import Option, choices_of, options_of, parameters_of
+from sgimd_torch.options.catalogue import ROD, TAUGHT_BY, WORDS, did_you_mean, load_word, word_of
+from sgimd_torch.options.signature import Option, as_text, options_of, parameters_of, parsed
 
 OWN: Final = "own"  # name of the run's own inverse model
 FILES: Final = ("benchmark", "demonstrations", "begin_with")  # options that name a file
-THREADS: Final = "environment.threads"
-PLACE: Final = ("seed", "out", "name", "board", THREADS)  # seed, place, display and speed of a run
-EVALUATES: Final = ("evaluated_by", "repeats", "floor_at", "benchmark_crc32")  # equal options of all evaluations
-MAY_CHANGE: Final = (
-    *("movements", "until", "out", "name", "board", "failures", "evaluate_at"),
-    *(*FILES, *EVALUATES, THREADS),
-)
-"""Options that may change when a run is resumed, as they do not affect the learner. Files are compared by their
-checksums: the demonstrations must be equal, the benchmark may be another one."""
 OF_TEACHING: Final = ("demonstrations", "teacher", "teachers", "social")  # options of taught algorithms
-ALGORITHM: Final = ""  # name of the part "algorithm" of a run: its options have no prefix
+LEAST: Final = {"seed": 0, "movements": 1, "repeats": 0, "failures": 1, "at_once": 1, "evaluate_at": 1, "floor_at": 1}
+"""Least value of an option, or of each of its numbers."""
 
 
 @dataclass(frozen=True)
@@ -86,102 +78,110 @@ class Config:
     def __post_init__(self) -> None:
         given = dict(self.parts)
         for name in given:
-            if name not in self.standards:
-                raise self._refused(name)
-        differing = sorted((name, value) for name, value in given.items() if differ(value, self.standards[name]))
-        object.__setattr__(self, "parts", tuple(differing))
-        for name, least in (("seed", 0), ("movements", 1), ("repeats", 0), ("failures", 1), ("at_once", 1)):
+            if name not in self.defaults:
+                raise self._unknown(name)
+        changed = sorted((name, value) for name, value in given.items() if differ(value, self.defaults[name]))
+        object.__setattr__(self, "parts", tuple(changed))
+        if self.teachers is not None and self.teaching != "teachers":
+            raise self._unknown("teachers")
+        if self.demonstrations is not None and not self.teaching:
+            raise self._unknown("demonstrations")
+        if self.begin_with is not None and "prior" not in parameters_of(self.chosen["algorithm"].make):
+            raise ValueError(f"--begin-with: algorithm {self.algorithm} does not learn from another robot")
+        for name, least in LEAST.items():
             value = getattr(self, name)
-            if value is not None and value < least:
-                raise ValueError(f"{name} must be at least {least}, got {value}")
+            if value is not None and min(value if isinstance(value, tuple) else (value,), default=least) < least:
+                raise ValueError(f"{name} must be at least {least}, got {as_text(value)}")
         if self.until is not None and not 0 < self.until < math.inf:
             raise ValueError(f"until must be an error above 0, in the unit of T, got {self.until}")
         if self.repeats == 1:
             raise ValueError("repeats must be 0 or at least 2, got 1; one outcome shows no scatter")
-        for name in ("evaluate_at", "floor_at"):
-            if min(getattr(self, name) or (1,)) < 1:
-                raise ValueError(f"{name} must be numbers of movements, at least 1, got {getattr(self, name)}")
         for name in ("evaluated_by", "teachers"):
             words = getattr(self, name)
             if words is not None and (not words or len({*words}) < len(words)):
-                raise ValueError(f"{name} must have at least one name, and each only once, got {','.join(words)}")
+                raise ValueError(f"{name} must have at least one name, and each only once, got {as_text(words)}")
         if self.evaluated_by[0] != OWN:
-            raise ValueError(f"evaluated_by must begin with {OWN}, got {','.join(self.evaluated_by)}")
-        for kind, words in (("inverse", self.evaluated_by[1:]), ("teachers", self.teachers or ())):
-            for word in words:
-                place_of(kind, word)
-        if self.teachers is not None and self.teaching != "teachers":
-            raise self._refused("teachers")
-        if self.demonstrations is not None and not self.teaching:
-            raise self._refused("demonstrations")
-        if self.begin_with is not None and "prior" not in parameters_of(self.chosen[ALGORITHM].make):
-            raise ValueError(f"--begin-with: algorithm {self.algorithm} does not learn from another robot")
+            raise ValueError(f"evaluated_by must begin with {OWN}, got {as_text(self.evaluated_by)}")
         if self.board and importlib.util.find_spec("tensorboardX") is None:
             raise ValueError("board true needs tensorboardX, which is not installed; pip install 'sgimd-torch[board]'")
         if self.variant in ("", ".", "..") or any(sign in self.variant for sign in "/\\\0"):
             raise ValueError(f"name must be the name of one directory, got {self.variant!r}; is it a path for --out?")
 
     def __getitem__(self, name: str) -> Any:
-        """Value of an option or a part in this run, such as "goals.window".
+        """Value of an option in this run, such as "goals.window", or name of a part, such as "goals".
 
         Raises:
             KeyError: the run has no such option.
         """
-        return getattr(self, name) if name in RUN else self.values[name]
+        return self.values[name]
 
     def __contains__(self, name: object) -> bool:
-        """Whether this run has such an option or part."""
-        return name in RUN or name in self.values
+        """Whether this run has such an option."""
+        return name in self.values
 
     @cached_property
     def chosen(self) -> dict[str, Part]:
-        """Parts of the run, by name."""
-        return chosen(self._choices)
+        """Parts of the run, by name; the run itself is the part ""."""
+        return chosen({"algorithm": self.algorithm, "teachers": self.teachers, **dict(self.parts)})
+
+    @cached_property
+    def defaults(self) -> dict[str, Any]:
+        """Default of every option, by name."""
+        return {name: option.default for name, option in all_options(self.chosen).items()}
+
+    @cached_property
+    def values(self) -> dict[str, Any]:
+        """Value of every option, by name."""
+        return {**self.defaults, **{name: getattr(self, name) for name in RUN}, **dict(self.parts)}
 
     @property
     def teaching(self) -> str:
         """How the learner is taught: by "teachers" (it asks them), by a "teacher" (who is not asked), or "" (alone)."""
-        return teaching(self._choices)
+        return teaching(self.values)
 
     @property
-    def _choices(self) -> dict[str, Any]:
-        return {"algorithm": self.algorithm, "teachers": self.teachers, **dict(self.parts)}
-
-    @cached_property
-    def standards(self) -> dict[str, Any]:
-        """Defaults of every part and every option of a part, by name."""
-        found = {name: part.standard for name, part in self.chosen.items() if name != ALGORITHM}
-        return found | {name: each.default for part in self.chosen.values() for name, each in part.options.items()}
-
-    @cached_property
-    def values(self) -> dict[str, Any]:
-        """Values of every part and every option of a part, by name."""
-        return {**self.standards, **dict(self.parts)}
+    def asked(self) -> tuple[str, ...]:
+        """Names of the teachers whom the learner asks."""
+        return (self.teachers or ("all",)) if self.teaching == "teachers" else ()
 
     def constructor(self, name: str) -> Callable[..., Any]:
         """The constructor of a part, with its options and the constructors of the parts that it chooses."""
         part = self.chosen[name]
-        given = {each: self.values[each] for each in part.options}
-        given |= {each: self.constructor(each) for each in part.choices}
-        return partial(part.make, **{each.rpartition(".")[2]: value for each, value in given.items()})
+        keywords = {
+            option.rpartition(".")[2]: self.constructor(option) if option in self.chosen else self.values[option]
+            for option in part.options
+        }
+        return partial(part.make, **keywords)
+
+    def with_found(self, found: Mapping[str, Any]) -> Self:
+        """These settings, with options that the robot ``found`` by movements, such as the corners of T."""
+        options = {f"environment.{name}": value for name, value in found.items() if f"environment.{name}" in self}
+        return replace(self, parts={**dict(self.parts), **options})
 
     @property
     def settings(self) -> dict[str, Any]:
-        """All options of this run as json values; ``from_settings`` makes the run from them."""
-        return as_json({**self.values, **{name: getattr(self, name) for name in RUN}})
+        """Value of every option as a json value; ``from_settings`` makes the run from them."""
+        return json.loads(json.dumps(self.values, default=str))
 
     @classmethod
     def from_settings(cls, settings: Mapping[str, Any]) -> Self:
-        """The run with these ``settings``; missing settings have their defaults.
+        """The run with these values by name, as json values or as a user types them; others have their defaults.
 
         Raises:
-            ValueError: a value is out of its range, or an option does not exist.
+            ValueError: a value is of another type or out of its range, or an option does not exist.
         """
-        own = dict(settings)
-        own |= {name: tuple(value) for name, value in own.items() if isinstance(value, list)}
-        own |= {name: Path(own[name]) for name in ("out", *FILES) if own.get(name) is not None}
-        parts = {name: value for name, value in own.items() if name not in RUN}
-        return cls(**{name: own[name] for name in RUN if name in own}, parts=parts)
+        values, options = dict(settings), all_options(chosen({"algorithm": cls.algorithm, **settings}))
+        for name, value in settings.items():
+            kind = options[name].kind if name in options else None
+            if isinstance(value, list):
+                values[name] = tuple(value)
+            elif isinstance(value, str) and not isinstance(kind, str | None):
+                try:
+                    values[name] = parsed(value, kind)
+                except ValueError as error:
+                    raise ValueError(f"--{dashed(name)} {error}") from error
+        parts = {name: value for name, value in values.items() if name not in RUN}
+        return cls(**{name: value for name, value in values.items() if name in RUN}, parts=parts)
 
     @property
     def variant(self) -> str:
@@ -203,38 +203,34 @@ class Config:
         """Numbers of movements after which to evaluate, in order."""
         if self.evaluate_at == ():
             return []
-        standard = (250, 500, *range(1000, self.movements, 1000))
-        wanted = standard if self.evaluate_at is None else self.evaluate_at
+        usual = (250, 500, *range(1000, self.movements, 1000))
+        wanted = usual if self.evaluate_at is None else self.evaluate_at
         return sorted({movements for movements in wanted if movements < self.movements} | {self.movements})
 
     def due(self, movements: int, numbers: Iterable[int]) -> bool:
         """Whether one of ``numbers`` falls into the group of robots that ended after this number of ``movements``."""
-        return any(0 <= movements - each < self.at_once for each in numbers)
+        return any(0 <= movements - number < self.at_once for number in numbers)
 
     @property
     def floors(self) -> tuple[int, ...]:
         """Numbers of movements at which an evaluation measures the noise."""
         return (self.movements,) if self.floor_at is None else self.floor_at
 
-    def _refused(self, name: str) -> ValueError:
+    def _unknown(self, name: str) -> ValueError:
         """The error for an option that this run does not have."""
         owner = name.rpartition(".")[0]
-        part = self.chosen.get(owner, self.chosen[ALGORITHM])
+        part = self.chosen[owner] if owner and owner in self.chosen else self.chosen["algorithm"]
         if name.partition(".")[0] in OF_TEACHING and not self.teaching:
             why = f"learns alone; taught are {', '.join(TAUGHT_BY)}"
         else:
-            known = {*self.standards, *RUN, *FLAGS} - {name}
-            near = did_you_mean(name, [each for each in sorted(known) if each.rpartition(".")[0] == owner], 2)
+            known = sorted(self.defaults.keys() - {name})
+            near = did_you_mean(name, [option for option in known if option.rpartition(".")[0] == owner], 2)
             why = f"has no such option{dashed(near)}"
         return ValueError(f"--{dashed(name)}: {part.kind} {part.word} {why}")
 
 
 RUN: Final = options_of(Config)
 """Options of every run."""
-FLAGS: Final = {
-    "resume": "flag: go on with a stopped or killed run, or lengthen a finished one.",
-    "accept_loss": "flag, with --resume: go on from the damage in a damaged record; a copy of the file is kept.",
-}
 
 
 class Part(NamedTuple):
@@ -242,19 +238,15 @@ class Part(NamedTuple):
 
     Attributes:
         kind: kind of the part, such as "progress".
-        word: name of the chosen part in the catalogue.
-        standard: name of the default part in the catalogue.
+        word: name of the part in the catalogue, or place of the part.
         make: constructor.
-        options: keywords that a run can set, by name in the run, such as "goals.progress.window".
-        choices: constructors of the default parts that it chooses, by name in the run, such as "goals.progress".
+        options: options by their names in the run, such as "goals.progress.window"; the default of a part is its name.
     """
 
     kind: str
     word: str
-    standard: str
     make: Callable[..., Any]
     options: Mapping[str, Option]
-    choices: Mapping[str, Callable[..., Any]]
 
 
 def teaching(given: Mapping[str, Any]) -> str:
@@ -266,7 +258,7 @@ def teaching(given: Mapping[str, Any]) -> str:
 
 
 def chosen(given: Mapping[str, Any]) -> dict[str, Part]:
-    """Parts of a run by name: environment, algorithm, teacher, and the parts that these choose.
+    """Parts of a run by name: the run itself, algorithm, environment, teacher, and the parts that these choose.
 
     Args:
         given: choices by name, such as "algorithm" or "goals"; other names are ignored.
@@ -274,42 +266,35 @@ def chosen(given: Mapping[str, Any]) -> dict[str, Part]:
     Raises:
         ValueError: there is no such part, or a package that it needs is not installed.
     """
-    found: dict[str, Part] = {}
-
-    def take(name: str, kind: str, default: Callable[..., Any] | str) -> None:
-        standard = word_of(kind, default) if callable(default) else default
-        word = given.get(name) or standard
-        if callable(default) and word == standard:
-            make, fixed = default, dict[str, Any]()
-        else:
-            make = load_word(kind, word)
-            fixed = make.keywords if isinstance(make, partial) else {}  # keywords that the word fixes
-        prefix = f"{name}." if name else ""
-        options = {prefix + each: option for each, option in options_of(make).items() if each not in fixed}
-        choices = {prefix + each: value for each, value in choices_of(make).items() if each not in fixed}
-        found[name] = Part(kind, word, standard, make, options, choices)
-        for each, value in choices.items():
-            take(each, each.removeprefix(prefix), value)
-
-    take("environment", "environment", ROD)
-    take(ALGORITHM, "algorithm", given["algorithm"])
+    first = {"algorithm": Option("algorithm", Config.algorithm), "environment": Option("environment", ROD)}
     if teaching(given) == "teacher":
-        take("teacher", "teacher", TAUGHT_BY.get(given["algorithm"], "periodic"))
-    return found
+        first["teacher"] = Option("teacher", TAUGHT_BY.get(given["algorithm"], "periodic"))
+    parts, waiting = {"": Part("run", "run", Config, {**RUN, **first})}, list(first.items())
+    while waiting:
+        name, (kind, default) = waiting.pop(0)
+        usual = default if isinstance(default, str) else word_of(kind, default)
+        word = given.get(name, usual)
+        make = default if callable(default) and word == usual else load_word(kind, word)
+        fixed = make.keywords if isinstance(make, partial) and make is not default else {}  # those that the word fixes
+        prefix = "" if name == "algorithm" else f"{name}."
+        options = {prefix + keyword: option for keyword, option in options_of(make).items() if keyword not in fixed}
+        options = {option: each for option, each in options.items() if option not in RUN}  # the run's own go first
+        choices = {option: each for option, each in options.items() if each.kind in WORDS}
+        words = {option: Option(each.kind, word_of(each.kind, each.default)) for option, each in choices.items()}
+        parts[name] = Part(kind, word, make, {**options, **words})
+        waiting[:0] = choices.items()
+    return parts
 
 
-def code_of(settings: Mapping[str, Any]) -> list[str]:
-    """Places ``package.module:attribute`` in ``settings`` that are a user's own code."""
-    chosen = [value for name, value in settings.items() if name.rpartition(".")[2] in (*WORDS, "evaluated_by")]
-    words = [word for value in chosen for word in (value if isinstance(value, list) else [value])]
-    return sorted({w for w in words if isinstance(w, str) and ":" in w and w not in PLACES})
+def all_options(parts: Mapping[str, Part]) -> dict[str, Option]:
+    """Options of a run with these parts, by name."""
+    return {name: option for part in parts.values() for name, option in part.options.items()}
 
 
 def words(config: Config) -> list[str]:
     """Arguments of ``sgimd run`` for a run: ``--dashed-name=value`` for the algorithm and each changed option."""
-    own = {name: getattr(config, name) for name in RUN}
-    own = {name: value for name, value in own.items() if value != RUN[name].default or name == "algorithm"}
-    return [f"--{dashed(name)}={as_text(value)}" for name, value in {**own, **dict(config.parts)}.items()]
+    changed = {name: value for name, value in config.values.items() if differ(value, config.defaults[name])}
+    return [f"--{dashed(name)}={as_text(value)}" for name, value in ({"algorithm": config.algorithm} | changed).items()]
 
 
 def differ(one: Any, other: Any) -> bool:
@@ -320,15 +305,3 @@ def differ(one: Any, other: Any) -> bool:
 def dashed(name: str) -> str:
     """Name of an option as the command line spells it."""
     return name.replace("_", "-")
-
-
-def as_json(value: Any) -> Any:
-    """Value of an option as a json value."""
-    return json.loads(json.dumps(value, default=str))
-
-
-def as_text(value: Any) -> str:
-    """Value of an option as a user types it."""
-    if isinstance(value, tuple):
-        return ",".join(map(as_text, value)) or "[]"
-    return json.dumps(value) if value is None or isinstance(value, bool) else str(value)

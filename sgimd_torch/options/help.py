@@ -7,17 +7,18 @@ from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from sgimd_torch.options.catalogue import WORDS, about
-from sgimd_torch.options.config import FLAGS, RUN, Config, Part, as_text, dashed
-from sgimd_torch.options.signature import Option, help_of, wanted
+from sgimd_torch.options.config import RUN, Config, chosen, dashed
+from sgimd_torch.options.signature import Option, as_text, help_of, name_of
 
-_PARTS: Final = [kind for kind in WORDS if kind not in ("algorithm", "command")]
-_PLACES: Final = {"progress": "goals.progress", "choose": "teacher.choose"}  # options that choose parts of other parts
-_WIDTH: Final = 120
+_CHOOSE: Final = {"progress": "goals.progress", "choose": "teacher.choose"}  # options that choose parts of other parts
+_WIDTH: Final = 120  # signs in a line
 
 
 def overview(description: str | None) -> str:
     """Text of ``sgimd run --help``: options and flags of every run, and names of parts."""
-    rivals = [word for word, at in WORDS["algorithm"].items() if at.startswith("rivals.")]
+    rivals = [word for word, place in WORDS["algorithm"].items() if place.startswith("rivals.")]
+    own = [word for word in WORDS["algorithm"] if word not in rivals]
+    parts = {_CHOOSE.get(kind, kind): words for kind, words in WORDS.items() if kind not in ("algorithm", "command")}
     lines = [
         "usage: sgimd run [--OPTION VALUE ...] [--resume]",
         "",
@@ -25,20 +26,21 @@ def overview(description: str | None) -> str:
         "",
         "options of every run:",
         *_described(RUN, Config),
-        *(_line(f"--{dashed(flag)}", text) for flag, text in FLAGS.items()),
+        _line("--resume", "flag: go on with a stopped or killed run, or lengthen a finished one"),
         "names for --algorithm:",
-        *(_line(word, about("algorithm", word)) for word in WORDS["algorithm"] if word not in rivals),
+        *(_line(word, about("algorithm", word)) for word in own),
         _line("for comparison", f"{', '.join(rivals)}; these need the extra rivals"),
         "names for the parts of a run; for a part of your own, type package.module:attribute:",
-        *(_line(f"--{_PLACES.get(kind, kind)}", ", ".join(words)) for kind, words in WORDS.items() if kind in _PARTS),
+        *(_line(f"--{option}", ", ".join(words)) for option, words in parts.items()),
         "",
         "Parts have options, too, such as --goals.window 12; to see them: sgimd run --goals interest-map --help",
     ]
     return "\n".join(lines)
 
 
-def help_on(parts: Mapping[str, Part]) -> str:
-    """Text of ``sgimd run --goals grid --help``: options of the chosen parts."""
+def help_on(choices: Mapping[str, str]) -> str:
+    """Text of ``sgimd run --goals uniform --help``: options of the chosen parts."""
+    parts = chosen({"algorithm": Config.algorithm, **choices})
     lines = [
         "This screen has the options of the chosen parts; "
         "sgimd run --help has the options of every run, such as --seed.",
@@ -46,23 +48,24 @@ def help_on(parts: Mapping[str, Part]) -> str:
         "C: contexts, which the robot sees and cannot choose. Pi: movement parameters, theta.",
         "T: outcomes; a goal is a point of T. The paper: Nguyen & Oudeyer (2014).",
     ]
-    for name, part in parts.items():
+    for name, part in list(parts.items())[1:]:  # the first is the run itself
         what = [about(part.kind, part.word)] if part.word in WORDS[part.kind] else []
-        leads_to = [f"--{each}={parts[each].word}" for each in part.choices]
+        leads_to = [f"--{option}={parts[option].word}" for option in part.options if option in parts]
         what += [f"default or chosen parts, each of which can be replaced: {' '.join(leads_to)}"] if leads_to else []
-        lines += ["", textwrap.fill(f"--{name or part.kind} {part.word}: {'; '.join(what)}", _WIDTH)]
-        lines += _described(part.options, part.make)
+        lines += ["", textwrap.fill(f"--{name} {part.word}: {'; '.join(what)}", _WIDTH)]
+        options = {option: value for option, value in part.options.items() if option not in parts}
+        lines += _described(options, part.make)
     return "\n".join(lines)
 
 
 def _described(options: Mapping[str, Option], make: Callable[..., Any]) -> list[str]:
     """Lines of help on ``options``, which are keywords of ``make``; a default tells the type, unless it is null."""
-    found, described = [], help_of(make)
-    for name, option in options.items():
-        said = described.get(name.rpartition(".")[2], "").replace("``", "").replace("None", "null").rstrip(".")
-        typed_as = f"{wanted(option.kind).removesuffix(' or null')}; " if option.default is None else ""
-        found.append(_line(f"--{dashed(name)}", f"{said} ({typed_as}default: {as_text(option.default)})"))
-    return found
+    lines, descriptions = [], help_of(make)
+    for name, (kind, default) in options.items():
+        text = descriptions.get(name.rpartition(".")[2], "").replace("``", "").replace("None", "null").rstrip(".")
+        its_type = f"{name_of(kind).removesuffix(' or null')}; " if default is None else ""
+        lines.append(_line(f"--{dashed(name)}", f"{text} ({its_type}default: {as_text(default)})"))
+    return lines
 
 
 def _line(name: str, text: str) -> str:

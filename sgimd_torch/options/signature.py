@@ -1,6 +1,7 @@
-"""Options of a part: the keywords of a class or a function that have a simple type and a default.
+"""Options of a part: keywords of a class or a function that have a default and a simple type, or that choose a part.
 
     options_of(InterestMap)["window"]                   # Option(kind=int, default=24)
+    options_of(InterestMap)["progress"]                 # Option(kind="progress", default=gained_progress)
     help_of(InterestMap)["window"]                      # "number of recent competences ...", from the docstring
 The signature gives name, type and default; the docstring gives the help; the body checks the bounds.
 """
@@ -8,6 +9,7 @@ The signature gives name, type and default; the docstring gives the help; the bo
 from __future__ import annotations
 
 import inspect
+import json
 import types
 import typing
 from collections.abc import Callable
@@ -18,8 +20,8 @@ from typing import Any, Final, NamedTuple, TypeVar, cast
 from sgimd_torch.options.catalogue import WORDS, function_of
 
 F = TypeVar("F", bound=Callable[..., Any])
-_SIMPLE: Final = (int, float, bool, str, Path, type(None), ...)
-_NAMES: Final[dict[Any, str]] = {  # of types, in help and in errors
+_EMPTY: Final = inspect.Parameter.empty
+_NAMES: Final[dict[Any, str]] = {  # names of types, for help and errors
     float: "a number",
     int: "a whole number",
     str: "text",
@@ -31,11 +33,15 @@ _NAMES: Final[dict[Any, str]] = {  # of types, in help and in errors
     tuple[int, ...]: "whole numbers with commas",
     tuple[str, ...]: "names with commas",
 }
-_NAMED: Final = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
 
 
 class Option(NamedTuple):
-    """A keyword that a run can set: its type and its default."""
+    """A keyword that a run can set.
+
+    Attributes:
+        kind: type of its values; or kind of the part that it chooses, such as "goals".
+        default: value if the run sets no other; for a part, its constructor.
+    """
 
     kind: Any
     default: Any
@@ -43,20 +49,20 @@ class Option(NamedTuple):
 
 @cache
 def options_of(make: Callable[..., Any]) -> dict[str, Option]:
-    """Keywords of ``make`` that have a default and a simple type: number, text, bool, path, tuple of these, or None."""
-    found = {name: Option(_simple(each), each.default) for name, each in parameters_of(make).items()}
-    return {name: each for name, each in found.items() if each.kind is not None and each.default is not _EMPTY}
+    """Options of ``make``, by name.
 
-
-def choices_of(make: Callable[..., Any]) -> dict[str, Callable[..., Any]]:
-    """Keywords of ``make`` that choose a part: keywords called like a kind of the catalogue, with a default part."""
-    found = {name: each.default for name, each in parameters_of(make).items() if name in WORDS}
-    return {name: default for name, default in found.items() if callable(default) and default is not _EMPTY}
+    A keyword called like a kind of the catalogue, with a constructor for a default, chooses a part. Simple types are
+    number, text, bool, path, tuple of these, or None.
+    """
+    parameters = {name: each for name, each in parameters_of(make).items() if each.default is not _EMPTY}
+    kinds = {name: _kind(each) for name, each in parameters.items()}
+    return {name: Option(kind, parameters[name].default) for name, kind in kinds.items() if kind is not None}
 
 
 def parameters_of(make: Callable[..., Any]) -> dict[str, inspect.Parameter]:
     """Parameters of ``make`` that can be given by name."""
-    return {each.name: each for each in inspect.signature(make).parameters.values() if each.kind in _NAMED}
+    by_name = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
+    return {each.name: each for each in inspect.signature(make).parameters.values() if each.kind in by_name}
 
 
 def help_of(make: Callable[..., Any]) -> dict[str, str]:
@@ -66,12 +72,12 @@ def help_of(make: Callable[..., Any]) -> dict[str, str]:
     make = function_of(make)
     decorated = make.__init__ if inspect.isclass(make) else make
     target = vars(decorated).get("with_keywords_of") if inspect.isfunction(decorated) else None
-    found = {} if target is None else help_of(target)
+    descriptions = {} if target is None else help_of(target)
     text = inspect.getdoc(make) or ""
-    for each in docstring_parser.parse(text, docstring_parser.DocstringStyle.GOOGLE).params:
-        about = " ".join((each.description or "").split()).partition(" Deviation:")[0]
-        found |= dict.fromkeys(each.arg_name.split(", "), about)
-    return found
+    for parameter in docstring_parser.parse(text, docstring_parser.DocstringStyle.GOOGLE).params:
+        description = " ".join((parameter.description or "").split()).partition(" Deviation:")[0]
+        descriptions |= dict.fromkeys(parameter.arg_name.split(", "), description)
+    return descriptions
 
 
 def with_keywords_of(target: Callable[..., Any], *names: str, **changed: Any) -> Callable[[F], F]:
@@ -84,66 +90,81 @@ def with_keywords_of(target: Callable[..., Any], *names: str, **changed: Any) ->
     """
 
     def decorate(function: F) -> F:
-        own = [each for each in inspect.signature(function).parameters.values() if each.kind is not each.VAR_KEYWORD]
-        mine = {each.name for each in own}
-        theirs = [each for each in parameters_of(target).values() if each.default is not _EMPTY or each.name in changed]
-        wanted = [each for each in theirs if each.name not in mine and (not names or each.name in names)]
-        handed = [each.replace(kind=each.KEYWORD_ONLY) for each in wanted]
-        every = [each.replace(default=changed.get(each.name, each.default)) for each in (*own, *handed)]
+        own = parameters_of(function)
+        listed = {
+            name: parameter.replace(kind=parameter.KEYWORD_ONLY)
+            for name, parameter in parameters_of(target).items()
+            if (parameter.default is not _EMPTY or name in changed) and (not names or name in names)
+        }
+        parameters = [
+            parameter.replace(default=changed.get(name, parameter.default))
+            for name, parameter in {**own, **listed, **own}.items()
+        ]
 
         @wraps(function)
         def made(*arguments: Any, **keywords: Any) -> Any:
             return function(*arguments, **{**changed, **keywords})
 
-        vars(made).update(__signature__=inspect.Signature(every), with_keywords_of=target)
+        vars(made).update(__signature__=inspect.Signature(parameters), with_keywords_of=target)
         return cast(F, made)
 
     return decorate
 
 
-_EMPTY: Final = inspect.Parameter.empty
-
-
-def _simple(parameter: inspect.Parameter) -> Any:
-    """Type of a parameter if it is simple, else None."""
+def _kind(parameter: inspect.Parameter) -> Any:
+    """Kind of the part that a parameter chooses, or its type if this is simple; None for other parameters."""
     kind = parameter.annotation
+    if parameter.name in WORDS and callable(parameter.default):
+        return parameter.name
     if isinstance(kind, str):
         try:
             kind = eval(kind, {**vars(typing), "Path": Path})
         except Exception:  # an unknown name is no simple type
             return None
     kind = type(parameter.default) if kind is _EMPTY else kind
-    return kind if kind is not type(None) and _is_simple(kind) else None
+    return kind if kind is not types.NoneType and _is_simple(kind) else None
 
 
 def _is_simple(kind: Any) -> bool:
     if typing.get_origin(kind) in (tuple, typing.Union, types.UnionType):
         return all(map(_is_simple, typing.get_args(kind)))
-    return kind in _SIMPLE
+    return kind in (*_NAMES, ...)
 
 
 def parsed(text: str, kind: Any) -> Any:
-    """``text`` as a value of type ``kind``; a list may be typed with brackets or without.
+    """``text`` as a value of type ``kind``; a list may have brackets or none.
 
     Raises:
-        ValueError: the text is of another type.
+        ValueError: the text is of another type; the message says which text was wanted.
     """
+    try:
+        return _parsed(text, kind)
+    except ValueError:
+        raise ValueError(f"must be {name_of(kind)}, got {text.strip()!r}") from None
+
+
+def _parsed(text: str, kind: Any) -> Any:
     inner = typing.get_args(kind)
     if typing.get_origin(kind) is tuple:
         items = [item.strip() for item in text.removeprefix("[").removesuffix("]").split(",") if item]
         kinds = [inner[0]] * len(items) if ... in inner else inner
-        return tuple(parsed(*each) for each in zip(items, kinds, strict=True))
+        return tuple(_parsed(item, of) for item, of in zip(items, kinds, strict=True))
     if inner:  # a union, with None last
-        if text == "null" and types.NoneType in inner:
-            return None
-        return parsed(text, inner[0])
+        return None if text == "null" and types.NoneType in inner else _parsed(text, inner[0])
     if kind is bool:
         return bool(("false", "true").index(text))
-    if not text or (kind in (int, float) and "_" in text):  # Python would read 1_0 as 10
-        raise ValueError(f"{text!r} is not {wanted(kind)}")
+    if (not text and kind is not str) or (kind in (int, float) and "_" in text):  # Python would read 1_0 as 10
+        raise ValueError
     return kind(text)
 
 
-def wanted(kind: Any) -> str:
+def as_text(value: Any) -> str:
+    """A value as a user types it; ``parsed`` is the inverse."""
+    if isinstance(value, tuple):
+        return ",".join(map(as_text, value)) or "[]"
+    return json.dumps(value) if value is None or isinstance(value, bool) else str(value)
+
+
+def name_of(kind: Any) -> str:
     """Name of a type, for somebody who types a value of this type."""
-    return _NAMES[kind] if kind in _NAMES else " or ".join(map(wanted, typing.get_args(kind)))
+    return _NAMES[kind] if kind in _NAMES else " or ".join(map(name_of, typing.get_args(kind)))

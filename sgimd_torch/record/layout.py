@@ -12,8 +12,7 @@ from sgimd_torch.learner.events import Event, Kind
 from sgimd_torch.spaces import Array, Demonstration
 
 DERIVED: Final = ("goals", "evaluations", "errors", "regions", "predictions", "refreshes")  # tables that a replay fills
-SEALS: Final = ["name TEXT", "n_rows INTEGER", "seal INTEGER"]  # columns of the table ``seals``
-HINT: Final = "was it damaged or edited?"  # last part of error messages
+HINT: Final = "was it damaged or edited? sqlite3 run.sqlite .recover saves what can be read"  # end of error messages
 
 Dims = tuple[int, int, int]
 """Dimensions of context, theta and outcome."""
@@ -40,7 +39,7 @@ def layout(dims: Dims) -> dict[str, list[str]]:
         _vector(name, dim) for name, dim in (("context", c), ("theta", p), ("goal", t), ("outcome", t))
     )
     words = ["demonstration INTEGER", "who TEXT", "strategy TEXT", "reply TEXT", "place INTEGER"]
-    evaluated = ["movements INTEGER", "answer TEXT"]
+    evaluated = ["movements INTEGER", "inverse TEXT"]
     numbers = ["mean_error", "median_error", "p90_error", "noise_floor", "expected_error"]
     predicted = [column for name in ("predicted", "epistemic", "aleatoric") for column in _vector(name, t)]
     learnt = ["held_out REAL", "relative_error REAL", "diverged INTEGER"]
@@ -57,7 +56,7 @@ def layout(dims: Dims) -> dict[str, list[str]]:
         "predictions": ["exemplar INTEGER", *outcome, *predicted],
         "refreshes": ["movements INTEGER", "exemplars INTEGER", "steps INTEGER", *learnt],
     }
-    return {table: [*each, "seal INTEGER"] for table, each in columns.items()}
+    return {table: [*names, "checksum INTEGER"] for table, names in columns.items()}
 
 
 def event_row(event: Event, movement: int, lesson: int | None, dims: Dims) -> Row:
@@ -69,12 +68,12 @@ def event_row(event: Event, movement: int, lesson: int | None, dims: Dims) -> Ro
         *_cells(event.goal, t),
         *_cells(event.outcome, t),
     )
-    origin, who, strategy, reply = (_text(each) for each in (event.origin, event.who, event.strategy, event.reply))
+    origin, who, strategy, reply = map(_text, (event.origin, event.who, event.strategy, event.reply))
     return movement, str(event.kind), origin, *vectors, lesson, who, strategy, reply, event.place
 
 
-def event_reader(dims: Dims, shown: Sequence[Demonstration]) -> Callable[[Row], Event]:
-    """A function that turns a row of ``events`` into an event; ``shown`` is the content of ``demonstrations``."""
+def event_reader(dims: Dims, demonstrations: Sequence[Demonstration]) -> Callable[[Row], Event]:
+    """A function that turns a row of ``events`` into an event; ``demonstrations`` are those of the record."""
     every = (*dims, dims[2])
     parts = [slice(*ends) for ends in pairwise(accumulate(every, initial=3))]
 
@@ -84,8 +83,8 @@ def event_reader(dims: Dims, shown: Sequence[Demonstration]) -> Callable[[Row], 
         kind = Kind(row[1])
         if kind not in _IN_CONTEXT:
             context = None
-        told = None if lesson is None else shown[lesson]
-        return Event(kind, context, theta, goal, outcome, row[2], told, who, strategy, reply, place)
+        demonstration = None if lesson is None else demonstrations[lesson]
+        return Event(kind, context, theta, goal, outcome, row[2], demonstration, who, strategy, reply, place)
 
     return read
 
@@ -95,11 +94,12 @@ def movements_after(movement: int, kind: str) -> int:
     return movement + (kind in _COUNTED)
 
 
-def demonstration_row(shown: Demonstration, dims: Dims) -> Row:
+def demonstration_row(demonstration: Demonstration, dims: Dims) -> Row:
     """The row of a demonstration."""
-    times, trajectory = (np.asarray(each, dtype=np.float64).tobytes() for each in (shown.times, shown.trajectory))
-    vectors = *_cells(shown.context, dims[0]), *_cells(shown.outcome, dims[2])
-    return *vectors, shown.trajectory.shape[1], times, trajectory
+    times = np.asarray(demonstration.times, dtype=np.float64)
+    trajectory = np.asarray(demonstration.trajectory, dtype=np.float64)
+    vectors = *_cells(demonstration.context, dims[0]), *_cells(demonstration.outcome, dims[2])
+    return *vectors, trajectory.shape[1], times.tobytes(), trajectory.tobytes()
 
 
 def read_demonstration(row: Row, dims: Dims) -> Demonstration:

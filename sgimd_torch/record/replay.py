@@ -54,7 +54,7 @@ def replay(
     before: dict[int, BeforeMovement] = {}
     for group in _together(events):
         event, index = group[0], learner.movements
-        last = index + group[-1].place
+        last, preceding = index + group[-1].place, before.get(event.place, BeforeMovement())
         # Between two runs the caller may show something, or begin or end an attempt; then no teacher is asked.
         between = event.place < 0 or (event.kind in _ALONE and event.who is None)
         if teacher is not None and not between:
@@ -64,20 +64,21 @@ def replay(
             case Kind.SHOWN:
                 if event.who == TEACHER and teacher is not None:
                     _check_lesson(last, event.lesson, offered.pop(last, None))
-                if learner.social is None and not learner.waits_for_answer:
-                    found = f"before movement {last} the learner was shown a demonstration, now it takes none"
-                    raise ReplayError(f"{found}; is it built in the same way and with the same seed?")
                 assert event.lesson is not None
-                learner.watch(event.lesson, who=event.who, place=event.place)
+                try:
+                    learner.watch(event.lesson, who=event.who, place=event.place)
+                except RuntimeError as error:
+                    refused = f"before movement {last} the learner was shown a demonstration, now it takes none"
+                    raise ReplayError(f"{refused}; is it built in the same way and with the same seed?") from error
                 if not between:
                     offered.pop(last, None)
-                    before[event.place] = _of(before, event)._replace(demonstration=event.lesson)
+                    before[event.place] = preceding._replace(demonstration=event.lesson)
             case Kind.ASKED:
                 assert event.context is not None
                 learner.request(event.context, place=event.place)
                 if event.who is not None and event.goal is not None:
                     request = Request(event.who, event.goal, event.strategy or "")
-                    before[event.place] = _of(before, event)._replace(request=request, reply=event.reply or "")
+                    before[event.place] = preceding._replace(request=request, reply=event.reply or "")
                     if event.reply != "shown":
                         learner.go_on_alone(event.reply or "", place=event.place)
             case Kind.ADDED:
@@ -93,31 +94,29 @@ def replay(
             case _:
                 for number in range(index, last + 1):
                     _check_lesson(number, None, offered.pop(number, None))
-                places = [each.place for each in group]
-                contexts: list[Array | Failure] = [Failure("")] * (places[-1] + 1)
-                for each in group:
-                    if each.context is not None and not _unseen(each):
-                        contexts[each.place] = each.context
+                contexts: list[Array | Failure] = [Failure("")] * (group[-1].place + 1)
+                for event in group:
+                    if event.context is not None and not _unseen(event):
+                        contexts[event.place] = event.context
                 moves = learner.ask_many(contexts)
-                for each in group:
-                    if _check_move(learner, each, index + each.place, moves[each.place]):
-                        assert each.theta is not None
-                        learner.replace_theta(each.theta, place=each.place)
+                for event in group:
+                    if _check_move(learner, event, index + event.place, moves[event.place]):
+                        assert event.theta is not None
+                        learner.replace_theta(event.theta, place=event.place)
                         if not rounded:
-                            warnings.warn(_ROUNDED.format(index + each.place), RuntimeWarning, stacklevel=2)
+                            warnings.warn(_ROUNDED.format(index + event.place), RuntimeWarning, stacklevel=2)
                         rounded = True
                 if event.kind == Kind.INTERRUPTED:
                     learner.interrupt()
                     asked_until = index  # when the run was resumed, its teacher was asked again
                     continue
-                learner.tell_many([_told(each) for each in group])
-                for each in group:
-                    failed = (each.reply or "") if each.kind == Kind.FAILED else ""
-                    context = each.context
-                    if context is None or _unseen(each):
+                learner.tell_many([Failure(event.reply or "") if _failed(event) else event.outcome for event in group])
+                for event in group:
+                    context, failed = event.context, event.reply or "" if _failed(event) else ""
+                    if context is None or _unseen(event):
                         context = np.full(learner.memory.context_dim, np.nan)
-                    caused = before.pop(each.place, BeforeMovement())
-                    yield Episode(index + each.place, context, moves[each.place], each.outcome, *caused, failed)
+                    preceding = before.pop(event.place, BeforeMovement())
+                    yield Episode(index + event.place, context, moves[event.place], event.outcome, *preceding, failed)
     return before
 
 
@@ -138,17 +137,13 @@ def _together(events: Iterable[Event]) -> Iterator[list[Event]]:
         yield group
 
 
-def _of(before: dict[int, BeforeMovement], event: Event) -> BeforeMovement:
-    return before.get(event.place, BeforeMovement())
+def _failed(event: Event) -> bool:
+    return event.kind == Kind.FAILED
 
 
 def _unseen(event: Event) -> bool:
     """Whether the robot failed before it could see a context."""
-    return event.kind == Kind.FAILED and event.theta is None
-
-
-def _told(event: Event) -> Array | Failure | None:
-    return Failure(event.reply or "") if event.kind == Kind.FAILED else event.outcome
+    return _failed(event) and event.theta is None
 
 
 def _check_move(learner: Learner, event: Event, index: int, move: Move | None) -> bool:
@@ -188,6 +183,6 @@ def _check_lesson(index: int, recorded: Demonstration | None, offered: Demonstra
     else:
         same = all(np.array_equal(getattr(recorded, name), getattr(offered, name)) for name in fields)
     if not same:
-        was, now = ("nothing" if each is None else "a demonstration" for each in (recorded, offered))
+        was, now = ("nothing" if lesson is None else "a demonstration" for lesson in (recorded, offered))
         other = "another one" if recorded is not None and offered is not None else now
         raise ReplayError(f"before movement {index} {was} was shown, the teacher now offers {other}; is it built anew?")

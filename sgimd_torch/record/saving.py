@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 from sgimd_torch.files import replacing
 from sgimd_torch.learner import Learner
@@ -11,7 +11,7 @@ from sgimd_torch.learner.events import Kind
 from sgimd_torch.parts import Teacher
 from sgimd_torch.record import Record, ReplayError, RunError
 from sgimd_torch.record.replay import replay
-from sgimd_torch.spaces import Move
+from sgimd_torch.spaces import Episode, Move
 
 
 def save_life(learner: Learner, path: str | os.PathLike[str]) -> None:
@@ -56,20 +56,22 @@ def load_life(
     Raises:
         ReplayError: this learner makes another movement. It has then lived a part of that life; build a new learner.
         RuntimeError: the learner has lived already.
-        RunError: there is no record at ``path``, or the record is damaged or of another robot.
+        RunError: there is no record at ``path``, or it is of another robot, or damaged; then, too, build a new learner.
     """
+    for episode in repeated(learner, path, teacher=teacher):
+        if after is not None:
+            after(episode.move)
+
+
+def repeated(learner: Learner, path: str | os.PathLike[str], *, teacher: Teacher | None = None) -> Iterator[Episode]:
+    """Let a learner repeat a saved life, one movement for each episode that is taken; see `load_life`."""
     if any(learner.events()) or not learner.idle:
         raise RuntimeError("load_life() needs a learner freshly built; this one has lived already")
     dims = learner.problem.dims
     with Record(path) as record:
-        damage = record.check()
-        for table in damage.keys() & {"events", "demonstrations"}:
-            raise RunError(damage[table])
         if record.dims != dims:
             raise RunError(f"{path} has dims {record.dims} of context, theta, outcome, not {dims}; another robot?")
         begun = record.about.get("begun", 0)
         if begun != learner.begun:
             raise ReplayError(f"{path} began with {begun} exemplars in memory, this learner began with {learner.begun}")
-        for episode in replay(learner, record.events(), teacher=teacher):
-            if after is not None:
-                after(episode.move)
+        yield from replay(learner, record.events(), teacher=teacher)

@@ -9,11 +9,12 @@ scikit-learn.    goals = AlpGmm(problem)
 from __future__ import annotations
 
 import warnings
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.goals.checks import check_attempt, check_in
+from sgimd_torch.goals.uniform import check_attempt, check_in
 from sgimd_torch.parts import Goals, Problem
 from sgimd_torch.spaces import Array, check_count
 
@@ -23,11 +24,11 @@ try:
 except ImportError as error:
     raise ImportError(f"ALP-GMM needs scikit-learn: pip install 'sgimd-torch[rivals]' ({error})") from error
 
-_DRAWS = 20  # number of draws from a Gaussian; the first that lies in T is the goal
+_DRAWS: Final = 20  # number of draws from a Gaussian; the first that lies in T is the goal
 # Number of goals between two fits; before the first fit, goals are uniform. Deviation: 250 in the publication, which is
 # half of the goals of a run on the rod.
-_REFIT = 50
-_COMPONENTS = 10  # largest number of Gaussians; Akaike's criterion chooses a number from 2 on
+_REFIT: Final = 50
+_COMPONENTS: Final = 10  # largest number of Gaussians; Akaike's criterion chooses a number from 2 on
 
 
 class AlpGmm(Goals):
@@ -47,13 +48,7 @@ class AlpGmm(Goals):
         ValueError: a number is out of its range.
     """
 
-    def __init__(
-        self,
-        problem: Problem,
-        *,
-        memory: int = 250,
-        uniform: float = 0.2,
-    ) -> None:
+    def __init__(self, problem: Problem, *, memory: int = 250, uniform: float = 0.2) -> None:
         super().__init__(problem)
         self.memory = check_count("memory", memory, _COMPONENTS)
         if not 0 <= uniform <= 1:

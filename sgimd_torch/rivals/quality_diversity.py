@@ -20,10 +20,9 @@ from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Correspondence, Learner
 from sgimd_torch.memory import Memory
 from sgimd_torch.options.signature import with_keywords_of
-from sgimd_torch.parts import Problem
-from sgimd_torch.rivals.explorer import QualityDiversity, Shown
-from sgimd_torch.spaces import check_count
-from sgimd_torch.strategies import Mimic
+from sgimd_torch.parts import Problem, Social, Strategy
+from sgimd_torch.spaces import Array, Attempt, Demonstration, Move, check_count
+from sgimd_torch.strategies import Mimic, recording_outcomes
 
 try:
     from ribs.archives import GridArchive
@@ -32,10 +31,11 @@ try:
 except ImportError as error:
     raise ImportError(f"quality diversity needs ribs: pip install 'sgimd-torch[rivals]' ({error})") from error
 
-_DEFAULT_CELLS = 400  # number of cells: 20 x 20 cells of .1 m in the fishing task, like the tiles of its benchmark
-_MAX_CELLS = 1_000_000  # largest number of cells; ribs keeps an array of all cells
-_LEAST_OBJECTIVE = -0.35  # first threshold of CMA-MAE's cells: below the objective of the corners of Pi, -.25
-_SHARED = ("cells", "correspondence", "imitations", "epsilon", "inverse", "memory")
+_DEFAULT_CELLS: Final = (
+    400  # number of cells: 20 x 20 cells of .1 m in the fishing task, like the tiles of its benchmark
+)
+_MAX_CELLS: Final = 1_000_000  # largest number of cells; ribs keeps an array of all cells
+_LEAST_OBJECTIVE: Final = -0.35  # first threshold of CMA-MAE's cells: below the objective of the corners of Pi, -.25
 MakeEmitters = Callable[[GridArchive, np.random.Generator], Sequence[EmitterBase]]
 
 
@@ -44,7 +44,7 @@ def quality_diversity(
     seed: int,
     origin: str,
     emitters: MakeEmitters,
-    annealed: dict[str, Any] | None = None,
+    annealed: dict[str, Any],
     *,
     cells: int | None = None,
     correspondence: Correspondence | None = None,
@@ -60,7 +60,7 @@ def quality_diversity(
         seed: number from which the random stream of the learner comes.
         origin: name of the random stream, and origin of the movements in the record.
         emitters: function (archive, rng) -> emitters, which propose movements.
-        annealed: keywords of the archive of CMA-MAE.
+        annealed: keywords of CMA-MAE's archive; empty for other algorithms.
         cells: number of cells in each dimension of T; None: about 400 cells in all.
         correspondence: function from times and trajectory to theta_d, eq. (6); None: the learner has no teacher.
         imitations: number of movements that imitate a demonstration.
@@ -83,23 +83,24 @@ def quality_diversity(
         dims=[cells] * outcomes.dim,
         ranges=list(zip(outcomes.low, outcomes.high, strict=True)),
         seed=_seed(rng),
-        **(annealed or {}),
+        **annealed,
     )
     scheduler = Scheduler(archive, emitters(archive, rng))
     explorer = QualityDiversity(problem, scheduler, origin)
     if correspondence is None:
         return Learner(problem, explorer)
-    shown = Shown(problem, explorer, Mimic(problem, repeats=imitations, epsilon=epsilon))
-    return Learner(problem, explorer, social=shown, correspondence=correspondence)
+    social = ImitateIntoArchive(problem, explorer, Mimic(problem, repeats=imitations, epsilon=epsilon))
+    return Learner(problem, explorer, social=social, correspondence=correspondence)
 
 
-@with_keywords_of(quality_diversity, *_SHARED)
+@with_keywords_of(quality_diversity)
 def map_elites(
     environment: Environment,
     seed: int,
     *,
     first: int = 100,
     sd: float = 0.05,
+    line: float = 0.0,
     batch: int = 10,
     **options: Any,
 ) -> Learner:
@@ -110,6 +111,8 @@ def map_elites(
         seed: number from which the random stream of the learner comes.
         first: number of uniform movements at the start.
         sd: standard deviation of the variations, as a fraction of each parameter's range in Pi.
+        line: standard deviation of a step towards another elite, relative to the distance between the two elites; 0: no
+            such steps.
         batch: number of movements between two updates of the archive.
         options: options of `quality_diversity`.
 
@@ -117,45 +120,31 @@ def map_elites(
         ValueError: a number is out of its range, or the environment has contexts, which an archive over T cannot hold.
     """
     _check_sd(sd)
-    sizes = check_count("first", first, 1), check_count("batch", batch, 1)
+    if not 0 <= line < np.inf:
+        raise ValueError(f"line must be finite and >= 0, got {line}; it is relative to the distance of two elites")
+    check_count("first", first, 1), check_count("batch", batch, 1)
+    dim = environment.policies.dim
 
     def emitters(archive: GridArchive, rng: np.random.Generator) -> list[EmitterBase]:
-        return [GaussianEmitter(archive, sigma=sd, **_begun(environment, rng, *sizes))]
+        shared: dict[str, Any] = {
+            "initial_solutions": rng.uniform(size=(first, dim)),
+            "batch_size": batch,
+            "lower_bounds": np.zeros(dim),
+            "upper_bounds": np.ones(dim),
+            "seed": _seed(rng),
+        }
+        if line:
+            return [IsoLineEmitter(archive, iso_sigma=sd, line_sigma=line, **shared)]
+        return [GaussianEmitter(archive, sigma=sd, **shared)]
 
-    return quality_diversity(environment, seed, "map-elites", emitters, **options)
-
-
-@with_keywords_of(quality_diversity, *_SHARED)
-def isoline(
-    environment: Environment,
-    seed: int,
-    *,
-    first: int = 100,
-    sd: float = 0.02,
-    line: float = 0.2,
-    batch: int = 10,
-    **options: Any,
-) -> Learner:
-    """MAP-Elites along lines, with a teacher: an elite, a step towards another elite, and a little noise.
-
-    Args:
-        environment, seed, first, batch, options: arguments of `map_elites`.
-        sd: standard deviation of the noise, as a fraction of each parameter's range in Pi.
-        line: standard deviation of the step, relative to the distance between the two elites.
-
-    Raises:
-        ValueError: see `map_elites`.
-    """
-    _check_sd(sd)
-    sizes = check_count("first", first, 1), check_count("batch", batch, 1)
-
-    def emitters(archive: GridArchive, rng: np.random.Generator) -> list[EmitterBase]:
-        return [IsoLineEmitter(archive, iso_sigma=sd, line_sigma=line, **_begun(environment, rng, *sizes))]
-
-    return quality_diversity(environment, seed, "isoline", emitters, **options)
+    return quality_diversity(environment, seed, "isoline" if line else "map-elites", emitters, {}, **options)
 
 
-@with_keywords_of(quality_diversity, *_SHARED)
+isoline = partial(map_elites, sd=0.02, line=0.2)
+"""MAP-Elites along lines, with a teacher: an elite, a step towards another elite, and a little noise."""
+
+
+@with_keywords_of(quality_diversity)
 def cma_me(
     environment: Environment,
     seed: int,
@@ -179,10 +168,10 @@ def cma_me(
         ValueError: see `map_elites`.
     """
     team = _team(environment, emitters, sd, batch, ranker="2imp")
-    return quality_diversity(environment, seed, "cma-me", team, **options)
+    return quality_diversity(environment, seed, "cma-me", team, {}, **options)
 
 
-@with_keywords_of(quality_diversity, *_SHARED)
+@with_keywords_of(quality_diversity)
 def cma_mae(
     environment: Environment,
     seed: int,
@@ -225,19 +214,6 @@ def _check_sd(sd: float) -> None:
         raise ValueError(f"sd must be positive and finite, got {sd}; without noise nothing new is tried")
 
 
-def _begun(environment: Environment, rng: np.random.Generator, first: int, batch: int) -> dict[str, Any]:
-    """Keywords of an emitter that starts with ``first`` uniform movements."""
-    dim = environment.policies.dim
-    uniform = rng.uniform(size=(first, dim))
-    return {
-        "initial_solutions": uniform,
-        "batch_size": batch,
-        "lower_bounds": np.zeros(dim),
-        "upper_bounds": np.ones(dim),
-        "seed": _seed(rng),
-    }
-
-
 def _team(environment: Environment, emitters: int, sd: float, batch: int | None, **rules: Any) -> MakeEmitters:
     """Function that makes evolution strategies, which all start at the centre of Pi."""
     _check_sd(sd)
@@ -257,3 +233,80 @@ def _team(environment: Environment, emitters: int, sd: float, batch: int | None,
 
 def _seed(rng: np.random.Generator) -> int:
     return int(rng.integers(2**32))
+
+
+class QualityDiversity(Strategy):
+    """Movements that a scheduler proposes in batches; after each batch, the scheduler is told the outcomes.
+
+    A cell keeps the movement with the largest objective, its elite. The objective is minus the mean square distance of
+    a movement from the middle of Pi, relative to the sides of Pi. An outcome outside T counts in the nearest border
+    cell of T. If T is far larger than the reachable part, most outcomes fall into a few cells, so there are few elites.
+
+    Each attempt is one movement. If an attempt is interrupted before its outcome, the next attempt repeats it. Several
+    robots at once may repeat the first movement of a batch near its end, because the next batch is not known yet.
+
+    Args:
+        problem: problem to learn; exemplars of its memory are in the archive from the start.
+        scheduler: scheduler of ribs, with an archive over T; its movements are relative to the sides of Pi. Deviation:
+            a movement outside Pi is clipped for execution, but the scheduler is told the objective of the proposed
+            movement. CMA-ES would draw such a movement again, and in many dimensions these draws may never end.
+        origin: origin of the movements, for the record.
+    """
+
+    def __init__(self, problem: Problem, scheduler: Scheduler, origin: str) -> None:
+        super().__init__(problem)
+        self.policies, self.archive = problem.policies, scheduler.archive
+        self._scheduler, self._origin = scheduler, origin
+        self._under_way: list[int] = []  # rows of the batch that are being executed
+        if len(problem.memory):
+            self.add(problem.memory.thetas, problem.memory.outcomes)
+        self._ask()
+
+    def attempt(self, context: Array) -> Attempt:
+        """The next movement of the batch."""
+        batch, outcomes = self._batch, self._outcomes
+        waiting = [row for row in range(len(batch)) if row not in self._under_way and row not in outcomes]
+        row = waiting[0] if waiting else 0
+        self._under_way.append(row)
+        try:
+            theta = self.policies.low + self.policies.sides * batch[row]
+            outcomes[row] = yield Move(self.policies.clip(theta), None, self._origin)
+        finally:  # interruption included
+            self._under_way.remove(row)
+        if batch is self._batch and len(outcomes) == len(batch):
+            results = np.stack([outcomes[row] for row in range(len(batch))])
+            self._scheduler.tell(objectives_of(batch), results)
+            self._ask()
+
+    def add(self, thetas: Array, outcomes: Array) -> None:
+        """Add other movements, ``thetas`` ``(n, theta_dim)`` in Pi with their outcomes, to the archive."""
+        batch = (thetas - self.policies.low) / self.policies.sides
+        self.archive.add(batch, objectives_of(batch), outcomes)
+
+    def _ask(self) -> None:
+        self._batch: Array = self._scheduler.ask()  # (n, theta_dim)
+        self._outcomes: dict[int, Array] = {}  # by row of the batch
+
+
+class ImitateIntoArchive(Social):
+    """Imitate a demonstration as in SGIM-D; the executed movements enter the archive, so that they are varied later."""
+
+    def __init__(self, problem: Problem, explorer: QualityDiversity, mimic: Mimic) -> None:
+        super().__init__(problem)
+        self.explorer, self.mimic = explorer, mimic
+
+    def attempt(self, context: Array, theta_d: Array, demonstration: Demonstration) -> Attempt:
+        """The movements of the imitation."""
+        executed: list[tuple[Array, Array]] = []
+        try:
+            yield from recording_outcomes(self.mimic.attempt(context, theta_d, demonstration), executed)
+        finally:  # interruption by the next demonstration included
+            if executed:
+                thetas, outcomes = zip(*executed, strict=True)
+                self.explorer.add(np.stack(thetas), np.stack(outcomes))
+
+
+def objectives_of(batch: Array) -> Array:
+    """Objectives: minus the mean square distance of each movement from the middle of Pi, relative to its sides."""
+    objectives: Array = -np.square(batch - 0.5).mean(axis=1)
+    return objectives

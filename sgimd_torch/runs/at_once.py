@@ -13,12 +13,12 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any
 
-from sgimd_torch.environments.protocol import BatchEnvironment, Environment, Limited
+from sgimd_torch.environments.protocol import BatchEnvironment, Environment, RobotCount
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.session import Execute, live
 from sgimd_torch.spaces import Array, Failure
 
-_here: Execute  # of a process that executes movements
+_robot: Execute  # executes movements in this process, if it is one of several
 
 
 def check_at_once(environment: Environment, at_once: int) -> None:
@@ -27,7 +27,7 @@ def check_at_once(environment: Environment, at_once: int) -> None:
     Raises:
         ValueError: the environment has a lower limit.
     """
-    if isinstance(environment, Limited) and at_once > environment.at_once:
+    if isinstance(environment, RobotCount) and at_once > environment.at_once:
         name = type(environment).__name__
         raise ValueError(f"at_once must be at most {environment.at_once}, the at_once of {name}, got {at_once}")
 
@@ -71,8 +71,8 @@ def in_processes(make: Callable[[], Any], seed: int, processes: int) -> Iterator
     try:
         yield execute
     except BaseException:  # after a second Ctrl-C, too, nothing waits for a robot that hangs
-        for each in list(pool._processes.values()):
-            each.kill()
+        for process in list(pool._processes.values()):
+            process.kill()
         raise
     finally:
         pool.shutdown()
@@ -80,18 +80,18 @@ def in_processes(make: Callable[[], Any], seed: int, processes: int) -> Iterator
 
 def _begin(make: Callable[[], Any], seed: int) -> None:
     """Begin a process: Ctrl-C is left to its parent, and it ends with its parent."""
-    global _here
+    global _robot
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     from multiprocessing import parent_process
 
     parent = parent_process()
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
     made = make()
-    _here = live(made.environment if isinstance(made, Task) else made, seed)
+    _robot = live(made.environment if isinstance(made, Task) else made, seed)
 
 
 def _execute(index: int, context: Array, theta: Array) -> Array | Failure:
-    (outcome,) = _here([index], [context], [theta])
+    (outcome,) = _robot([index], [context], [theta])
     return Failure(outcome.reason) if isinstance(outcome, Failure) else outcome  # its cause may not be picklable
 
 

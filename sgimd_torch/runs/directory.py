@@ -1,6 +1,6 @@
-"""Open the record of a run: refuse a record of another run, and keep the undamaged part.
+"""Open the record of a run; refuse a record of another run.
 
-record, notes = open_run(build(config), resume=True, accept_loss=False)
+record, notes = open_run(build(config), resume=True)
 A run is the file ``run.sqlite`` in OUT/NAME/seed-003; ``docs/runs.md`` explains its tables.
 """
 
@@ -10,9 +10,8 @@ import importlib.metadata
 import importlib.util
 import os
 import platform
-import shutil
 import subprocess
-from itertools import count
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -20,29 +19,37 @@ import sgimd_torch
 from sgimd_torch.environments.protocol import Environment, FromFiles
 from sgimd_torch.files import checksum, make_folder
 from sgimd_torch.options.build import RunParts
-from sgimd_torch.options.catalogue import function_of
-from sgimd_torch.options.config import EVALUATES, MAY_CHANGE, PLACE, Config, code_of, differ, words
+from sgimd_torch.options.catalogue import PLACES, WORDS, function_of
+from sgimd_torch.options.config import FILES, Config, differ, words
 from sgimd_torch.record import Dims, Record, RunError
 
 FILE: Final = "run.sqlite"
+THREADS: Final = "environment.threads"
+PLACE: Final = ("seed", "out", "name", "board", THREADS)  # seed, place, display and speed of a run
+EVALUATES: Final = ("evaluated_by", "repeats", "floor_at", "benchmark_crc32")  # equal options of all evaluations
+MAY_CHANGE: Final = (
+    *("movements", "until", "out", "name", "board", "failures", "evaluate_at"),
+    *(*FILES, *EVALUATES, THREADS),
+)
+"""Options that may change when a run is resumed, as they do not affect the learner. Files are compared by their
+checksums: the demonstrations must be equal, the benchmark may be another one."""
 LONGEST: Final = 504  # bytes, longest path of a file that SQLite opens
 LIBRARIES: Final = ("numpy", "scipy", "faiss-cpu", "mujoco")
-FORWARD: Final = ("torch", "lightning", "safetensors")  # libraries of a forward model
+FORWARD: Final = ("torch", "lightning")  # libraries of a forward model
 EVALUATED: Final = ("evaluations", "errors", "regions")  # tables that each evaluation adds to
 OF_MODEL: Final = ("predictions", "refreshes")  # tables that a forward model adds to
 
 
-def open_run(parts: RunParts, *, resume: bool, accept_loss: bool = False) -> tuple[Record, list[str]]:
+def open_run(parts: RunParts, *, resume: bool) -> tuple[Record, list[str]]:
     """The record of a run, open for writing, and messages. The file does not change before the first commit.
 
     Args:
         parts: parts of the run; its configuration has the directory.
         resume: whether to continue an existing run; if False, an existing run is an error.
-        accept_loss: whether to continue a damaged run; a copy is kept, and everything from the damage on is repeated.
 
     Raises:
-        RunError: there is a run and ``resume`` is False; the run has other settings, or more movements; it is damaged
-            and the loss is not accepted; the file is no record; another process is writing it.
+        RunError: there is a run and ``resume`` is False; the run has other settings, or more movements; the file is
+            damaged or no record; another process is writing it.
         OSError: the file cannot be written.
     """
     config, robot = parts.config, parts.environment
@@ -55,7 +62,7 @@ def open_run(parts: RunParts, *, resume: bool, accept_loss: bool = False) -> tup
         "robot": type(robot).__name__,
         "words": words(config),
         "tolerance": parts.learner.problem.tolerance,
-        "met": None,
+        "ended_early": None,
         "spaces": {n: [b.low.tolist(), b.high.tolist(), b.names, b.unit] for n, b in spaces.items()},
     }
     dims = robot.contexts.dim, robot.policies.dim, robot.outcomes.dim
@@ -69,7 +76,7 @@ def open_run(parts: RunParts, *, resume: bool, accept_loss: bool = False) -> tup
             notes.append(f"{path.parent} holds no run yet: the run starts from the beginning")
         record = Record.make(path, dims, about)
     elif resume:
-        record = _reopened(path, about, dims, config, accept_loss, notes)
+        record = _reopened(path, about, dims, config, notes)
     else:
         raise RunError(f"{path.parent} already holds a run; continue it with --resume, or choose another --out")
     record.replace_rows("goals", ((k, *goal) for k, goal in enumerate(parts.benchmark.goals.tolist())))
@@ -83,7 +90,9 @@ def holds_run(path: Path) -> bool:
 
 def with_found_earlier(config: Config) -> Config:
     """The settings, with what the robot found by movements when this run began, if the run is on disk."""
-    names = {f"environment.{name}" for name in getattr(function_of(config.chosen["environment"].make), "FOUND", ())}
+    names = {
+        f"environment.{name}" for name in getattr(function_of(config.chosen["environment"].make), "FOUND_OPTIONS", ())
+    }
     if not names or not holds_run(config.directory / FILE):
         return config
     with Record(config.directory / FILE) as record:
@@ -91,88 +100,60 @@ def with_found_earlier(config: Config) -> Config:
     own = {name: value for name, value in config.settings.items() if name.startswith("environment")}
     if any(differ(before.get(name), own[name]) for name in own.keys() - names - {*PLACE}):
         return config  # it is another robot's run
-    found = {name: before[name] for name in names & before.keys() if name not in dict(config.parts)}
-    return Config.from_settings({**config.settings, **found})
+    earlier = {name: before[name] for name in names & before.keys() if name not in dict(config.parts)}
+    return Config.from_settings({**config.settings, **earlier})
 
 
-def _reopened(
-    path: Path, about: dict[str, Any], dims: Dims, config: Config, accept_loss: bool, notes: list[str]
-) -> Record:
-    """The record at ``path``, open for writing, undamaged, without the tables that the replay fills again.
+def _reopened(path: Path, about: dict[str, Any], dims: Dims, config: Config, notes: list[str]) -> Record:
+    """The record at ``path``, open for writing, without the tables that the replay fills again.
 
     ``about`` describes the run now, and gets the versions of earlier parts of the run. ``notes`` gets messages.
     """
     record = Record(path, write=True)
     try:
-        damage = record.check()
-        others = _refuse_other(record, about, dims, lost="about" in damage)
-        if damage:
-            record.close()  # copying an open record would release its lock
-            record = _salvaged(path, "; ".join(damage.values()), accept_loss, notes)
+        others = _refuse_other(record, about, dims)
         if record.movements > config.movements:
             raise RunError(f"{path} has {record.movements} movements already, {config.movements} were requested")
-        met = record.about.get("met")
-        if met and met[0] == record.movements and "until" not in others:
-            about["met"] = met
-        _forget_evaluations(record, config, ended_early=about["met"], anew=bool(others & {*EVALUATES}), notes=notes)
+        if "until" not in others:
+            about["ended_early"] = record.about["ended_early"]
+        _forget_evaluations(record, config, about["ended_early"], anew=bool(others & {*EVALUATES}), notes=notes)
         for table in OF_MODEL:
             record.replace_rows(table, ())
-        if "versions" in record.about:
-            about["versions"] = _with_earlier(record.about["versions"], about["versions"], notes)
-        record.settle(**about)
+        about["versions"] = _with_earlier(record.about["versions"], about["versions"], notes)
+        record.about |= about
     except BaseException:
         record.close()
         raise
     return record
 
 
-def _salvaged(path: Path, damage: str, accept_loss: bool, notes: list[str]) -> Record:
-    """The damaged record at ``path``, cut before the damage and open for writing; a copy of the old file is kept."""
-    if not accept_loss:
-        raise RunError(
-            f"{damage} Restore the record, or repeat its damaged part with --resume --accept-loss, which keeps a copy"
-        )
-    copy = next(place for k in count() if not (place := path.with_name(f"run.lost-{k}.sqlite")).exists())
-    shutil.copy2(path, copy)
-    record = Record(path, write=True).rewrite()
-    notes.append(f"{damage} The damaged record is kept as {copy}")
-    notes.append(f"{record.movements} movements of {path} are kept, everything else is repeated")
-    return record
-
-
 def _forget_evaluations(
-    record: Record, config: Config, *, ended_early: list[Any] | None, anew: bool, notes: list[str]
+    record: Record, config: Config, ended_early: list[Any] | None, *, anew: bool, notes: list[str]
 ) -> None:
     """Drop evaluations that are not requested, and all after the first missing one; with ``anew``, drop all."""
     made = list(dict.fromkeys(movements for movements, *_ in record.rows("evaluations")))
-    if not made:  # then the settings may be lost
-        return
     ended = record.about["settings"]["movements"]  # if this run ends later, the noise is not measured here
     longer = config.floor_at is None and ended != config.movements
     requested = sorted({*config.evaluations, *(ended_early or [])[:1]})
     kept, left = list[int](), requested
-    for each in made:
-        if anew or not config.due(each, requested) or (longer and each == ended):
+    for movements in made:
+        if anew or not config.due(movements, requested) or (longer and movements == ended):
             continue
-        if not config.due(each, left[:1]):
+        if not config.due(movements, left[:1]):
             break
-        kept.append(each)
-        left = [wanted for wanted in left if wanted > each]
+        kept.append(movements)
+        left = [wanted for wanted in left if wanted > movements]
     if others := [str(movements) for movements in made if movements not in kept]:
         notes.append(f"evaluations after {', '.join(others)} movements are dropped, or repeated if requested")
         for table in EVALUATED:
             record.replace_rows(table, [row for row in record.rows(table) if row[0] in kept])
 
 
-def _refuse_other(record: Record, about: dict[str, Any], dims: Dims, *, lost: bool) -> set[str]:
-    """Refuse a record of another run; return the names of the settings that differ and are allowed to differ.
-
-    If its settings are ``lost``, the replay finds out whether it is another run.
-    """
-    if "settings" not in record.about and not lost:
+def _refuse_other(record: Record, about: dict[str, Any], dims: Dims) -> set[str]:
+    """Refuse a record of another run; return the names of the settings that differ and are allowed to differ."""
+    if "settings" not in record.about:
         raise RunError(f"{record.path} is a life that save_life wrote, not a run; choose another --out")
-    known = about.keys() & record.about.keys() & {"settings", "files"}
-    before, now = ({name: v for k in known for name, v in each[k].items()} for each in (record.about, about))
+    before, now = ({**told["settings"], **told["files"]} for told in (record.about, about))
     others = [name for name in dict.fromkeys((*now, *before)) if differ(before.get(name), now.get(name))]
     if changed := [name for name in others if name not in MAY_CHANGE]:
         raise RunError(
@@ -201,12 +182,19 @@ def sources(config: Config, robot: Environment) -> dict[str, str]:
     """File and checksum of each part that is the user's own code, such as "toss.py, crc32 8f0a1b2c", and of a model."""
     files = robot.files if isinstance(robot, FromFiles) else ()
     root = os.path.commonpath([path.parent for path in files]) if files else ""
-    found = {f"file {path.relative_to(root)}": f"crc32 {checksum(path)}" for path in files}
+    checksums = {f"file {path.relative_to(root)}": f"crc32 {checksum(path)}" for path in files}
     for word in code_of(config.settings):
         spec = importlib.util.find_spec(word.partition(":")[0])
         if spec is not None and spec.has_location and spec.origin:
-            found[f"source of {word}"] = f"{Path(spec.origin).name}, crc32 {checksum(Path(spec.origin))}"
-    return found
+            checksums[f"source of {word}"] = f"{Path(spec.origin).name}, crc32 {checksum(Path(spec.origin))}"
+    return checksums
+
+
+def code_of(settings: Mapping[str, Any]) -> list[str]:
+    """Places ``package.module:attribute`` in ``settings`` that are a user's own code."""
+    named = [value for name, value in settings.items() if name.rpartition(".")[2] in (*WORDS, "evaluated_by")]
+    words = [word for value in named for word in (value if isinstance(value, list) else [value])]
+    return sorted({word for word in words if isinstance(word, str) and ":" in word and word not in PLACES})
 
 
 def versions(*, forward: bool) -> dict[str, Any]:
@@ -217,8 +205,8 @@ def versions(*, forward: bool) -> dict[str, Any]:
     Args:
         forward: whether to include the libraries of a forward model, which other runs do not need.
     """
-    here = str(Path(__file__).parent)
-    describe = ["git", "-C", here, "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"]
+    folder = str(Path(__file__).parent)
+    describe = ["git", "-C", folder, "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"]
     try:
         commit = subprocess.run(describe, capture_output=True, text=True, check=True, timeout=10).stdout.strip()
     except (OSError, subprocess.SubprocessError):

@@ -35,12 +35,9 @@ class Evaluations:
     """All evaluations of a run, by the number of movements before each one.
 
     Args:
-        parts: parts of the run; their ``answers`` are evaluated.
+        parts: parts of the run; their ``inverses`` are evaluated.
         record: record of the run; movements of an evaluation are not recorded.
         between: function to call between movements of an evaluation; it may raise `KeyboardInterrupt`.
-
-    Attributes:
-        made: number of movements of all evaluations so far, recorded ones included.
     """
 
     parts: RunParts
@@ -51,64 +48,53 @@ class Evaluations:
         rows: dict[int, dict[str, list[Any]]] = {}
         for movements, word, _, *numbers in self.record.rows("errors"):
             rows.setdefault(movements, {}).setdefault(word, []).append(numbers)
-        self._found: dict[int, ByInverse] = {
-            movements: {word: _evaluation(np.array(each, dtype=np.float64)) for word, each in by_word.items()}
+        self._by_movements: dict[int, ByInverse] = {
+            movements: {word: _evaluation(np.array(numbers, dtype=np.float64)) for word, numbers in by_word.items()}
             for movements, by_word in rows.items()
         }
-        self.made = sum(map(self.size, self._found))
 
     @property
     def last(self) -> Evaluation | None:
         """The last evaluation of the run's own inverse model, None if there is none."""
-        return self._found[max(self._found)][OWN] if self._found else None
-
-    def size(self, movements: int) -> int:
-        """Number of movements of the evaluation after this number of ``movements``."""
-        different = len(set(map(id, self.parts.inverses.values())))
-        return len(self.parts.benchmark.goals) * (different + self._repeats(movements))
+        return self._by_movements[max(self._by_movements)][OWN] if self._by_movements else None
 
     def after(self, movements: int) -> ByInverse | None:
         """The recorded evaluation after this number of movements, else a new evaluation of the present learner.
 
         The result is None while memory is empty: the observing learner remembers nothing before a demonstration.
         """
-        if movements not in self._found and len(self.parts.learner.memory):
-            self._found[movements] = self._evaluate(movements)
-            self.made += self.size(movements)
-            self._write(movements, self._found[movements])
-        return self._found.get(movements)
+        if movements not in self._by_movements and len(self.parts.learner.memory):
+            self._by_movements[movements] = self._evaluate(movements)
+            self._write(movements, self._by_movements[movements])
+        return self._by_movements.get(movements)
 
     def _evaluate(self, movements: int) -> ByInverse:
         """Evaluate with streams that the run does not use.
 
         At each goal the noise is the same for all inverse models. The noise floor is measured for the run's own model.
         """
-        inverses, repeats = self.parts.inverses, self._repeats(movements)
-        own, *others = inverses
-        parts = self.parts
-        judged: tuple[Any, ...] = parts.environment, parts.benchmark.goals, parts.config.seed, movements
-        how: dict[str, Any] = {"between": self.between}
-        found = {own: evaluate(inverses[own], *judged, repeats=repeats, **how)}
-        for word in others:
-            same = inverses[word] is inverses[own]
-            found[word] = found[own].without_noise if same else evaluate(inverses[word], *judged, repeats=0, **how)
-        return found
+        parts, config = self.parts, self.parts.config
+        where = parts.environment, parts.benchmark.goals, config.seed, movements
+        repeats = config.repeats if config.due(movements, config.floors) else 0
+        own = evaluate(parts.inverses[OWN], *where, repeats=repeats, between=self.between)
+        evaluations = {OWN: own}
+        for name, inverse in parts.inverses.items():
+            if inverse is parts.inverses[OWN]:
+                evaluations.setdefault(name, own.without_noise)
+            else:
+                evaluations[name] = evaluate(inverse, *where, repeats=0, between=self.between)
+        return evaluations
 
-    def _repeats(self, movements: int) -> int:
-        config = self.parts.config
-        return config.repeats if config.due(movements, config.floors) else 0
-
-    def _write(self, movements: int, found: ByInverse) -> None:
+    def _write(self, movements: int, evaluations: ByInverse) -> None:
         """Add evaluations to the record, and the current regions of the goal model."""
-        for word, each in found.items():
-            errors, met = each.errors, each.met(self.parts.benchmark.side / 2)
+        for word, evaluation in evaluations.items():
+            errors, met = evaluation.errors, evaluation.met(self.parts.benchmark.side / 2)
             quantiles = np.median(errors), np.quantile(errors, 0.9)
-            summary = each.mean_error, *quantiles, each.noise_floor, each.expected.mean(), met
+            summary = evaluation.mean_error, *quantiles, evaluation.noise_floor, evaluation.expected.mean(), met
             self.record.add_rows("evaluations", [(movements, word, *summary)])
-            numbers = errors.tolist(), each.scatter.tolist(), each.failed.astype(int), each.expected.tolist()
-            columns = zip(*numbers, each.contexts, strict=True)
-            rows = [(movements, word, k, *more, *context) for k, (*more, context) in enumerate(columns)]
-            self.record.add_rows("errors", rows)
+            columns = errors, evaluation.scatter, evaluation.failed.astype(int), evaluation.expected
+            rows = zip(range(len(errors)), *columns, evaluation.contexts, strict=True)
+            self.record.add_rows("errors", [(movements, word, *numbers, *context) for *numbers, context in rows])
         self.record.add_rows("regions", [(movements, *_fields(region)) for region in self.parts.learner.regions])
 
 
@@ -128,7 +114,7 @@ def _fields(region: Region) -> Iterator[Any]:
 def ends_now(parts: RunParts, record: Record, movements: int) -> bool:
     """Whether the learner expects no larger error than --until says; it looks now and then. The record keeps it."""
     config, learner = parts.config, parts.learner
-    if record.about["met"] is not None:
+    if record.about["ended_early"] is not None:
         return True
     moments = range(0, movements + 1, LOOK_EVERY * max(1, movements // (10 * LOOK_EVERY)))[1:]
     if not (config.due(movements, moments) and len(learner.memory)):
@@ -138,7 +124,7 @@ def ends_now(parts: RunParts, record: Record, movements: int) -> bool:
     expected = expected_error(learner.inverse, goals, stream(config.seed, "until", movements))
     assert config.until is not None
     if expected <= config.until:  # not if it is NaN
-        record.settle(met=[movements, expected])
+        record.about["ended_early"] = [movements, expected]
         return True
     return False
 

@@ -1,16 +1,18 @@
-"""The parts of a recorded run, with the learner as it was at the end.
+"""Open a run: its parts are built again from its settings, and its learner repeats its record.
 
 learner = load_learner("runs/practice/seed-000"); learner.inverse(context, goal).theta
+run = OpenRun(path); run.replay(300); run.replay(5000)     # the learner after 300 movements, later after 5000
 """
 
 from __future__ import annotations
 
+import math
 import os
 from pathlib import Path
 
 from sgimd_torch.learner import Learner
-from sgimd_torch.options.build import RunParts, build
-from sgimd_torch.record.saving import load_life
+from sgimd_torch.options.build import build
+from sgimd_torch.record.saving import repeated
 from sgimd_torch.runs.directory import FILE
 from sgimd_torch.runs.read import config_of, read_run
 
@@ -26,12 +28,45 @@ def load_learner(path: str | os.PathLike[str], *, trust: bool = False) -> Learne
         RunError: there is no run, it names code of the user and ``trust`` is false, or its record is damaged.
         ReplayError: the learner does not repeat its record.
     """
-    return load_parts(path, trust=trust).learner
+    run = OpenRun(path, trust=trust)
+    run.replay()
+    return run.parts.learner
 
 
-def load_parts(path: str | os.PathLike[str], *, trust: bool = False) -> RunParts:
-    """All parts of a run; the learner has repeated its record. See ``load_learner``."""
-    parts = build(config_of(read_run(path), trust=trust))
-    learner, trained = parts.learner, parts.learner.problem.trained
-    load_life(learner, Path(path) / FILE, after=lambda _: [model.refresh(learner.memory) for model in trained])
-    return parts
+class OpenRun:
+    """A run on disk, finished or still running, whose learner can repeat the recorded movements.
+
+    Args:
+        path: directory of the run.
+        trust: whether to execute the user's code that the settings of the run name.
+
+    Attributes:
+        recorded: record of the run, as arrays.
+        parts: parts of the run; the learner has made no movement before ``replay``.
+
+    Raises:
+        RunError: see ``load_learner``.
+    """
+
+    def __init__(self, path: str | os.PathLike[str], *, trust: bool = False) -> None:
+        self.recorded = read_run(path)
+        self.parts = build(config_of(self.recorded, trust=trust))
+        self._episodes = repeated(self.parts.learner, Path(path) / FILE)
+
+    def replay(self, movements: int | None = None) -> None:
+        """Let the learner repeat its record until it has made this number of ``movements``; None: to the end.
+
+        Robots that moved at once make the last movements together, so there may be more.
+
+        Raises:
+            ReplayError: the learner does not repeat its record.
+        """
+        learner = self.parts.learner
+        last = math.inf if movements is None or movements >= len(self.recorded.index) else movements
+        if learner.movements >= last:
+            return
+        for episode in self._episodes:
+            for model in learner.problem.trained:
+                model.refresh(learner.memory)
+            if last <= learner.movements == episode.index + 1:
+                return

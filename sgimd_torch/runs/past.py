@@ -1,6 +1,6 @@
 """Movements of another robot, such as a simulator, that a run begins with: ``--begin-with``.
 
-memory = past_of(Path("simulated/practice/seed-000/run.sqlite"), environment)
+memory, notes, crc32 = past_of(task, Path("simulated/practice/seed-000/run.sqlite"))
 """
 
 from __future__ import annotations
@@ -13,51 +13,63 @@ from typing import Final
 import numpy as np
 
 from sgimd_torch.environments.protocol import Environment
-from sgimd_torch.files import check_regular
+from sgimd_torch.files import checksum
 from sgimd_torch.learner.events import Kind
 from sgimd_torch.memory import Memory
 from sgimd_torch.options.signature import parsed
 from sgimd_torch.record import Record, RunError
+from sgimd_torch.runs.tasks import Task
 from sgimd_torch.spaces import Array, Box, check_vector
 
 _SQLITE: Final = b"SQLite format 3"  # a record begins with it
 Exemplar = tuple[Array, Array, Array]
 
 
-def past_of(path: Path, robot: Environment) -> Memory:
+def past_of(task: Task, path: Path) -> tuple[Memory, list[str], str]:
     """The movements in a record, or in a csv file with columns ``context_0``, ``theta_0``, ``outcome_0`` and so on.
+
+    Args:
+        task: task of the run, whose robot must have the dimensions of these movements.
+        path: record or csv file.
+
+    Returns:
+        The movements, messages about them, and the checksum of the file.
 
     Raises:
         ValueError: the file is damaged or has no movements, or its robot has other dimensions, units or bounds.
         OSError: the file cannot be read.
     """
-    check_regular(path)
+    robot, crc32 = task.environment, checksum(path)
     with path.open("rb") as file:
         recorded = file.read(len(_SQLITE)) == _SQLITE
-    found = list(_recorded(path, robot) if recorded else _listed(path, robot))
-    if not found:
+    exemplars = list(_recorded(path, robot) if recorded else _listed(path, robot))
+    if not exemplars:
         raise RunError(f"{path} holds no movements to begin with")
-    contexts, thetas, outcomes = (np.stack(each) for each in zip(*found, strict=True))
+    contexts, thetas, outcomes = (np.stack(column) for column in zip(*exemplars, strict=True))
     robot.contexts.check(f"contexts of {path}", contexts)
     robot.policies.check(f"thetas of {path}", thetas)
     memory = Memory(robot.contexts.dim, robot.policies.dim, robot.outcomes.dim)
     memory.extend(contexts, thetas, check_vector(f"outcomes of {path}", outcomes, robot.outcomes.dim))
-    return memory
+    return memory, [f"begins with {len(memory)} movements of {path}, as far as they help"], crc32
 
 
 def _recorded(path: Path, robot: Environment) -> Iterator[Exemplar]:
     """Exemplars of a record; a run says in which boxes, with which units."""
-    here = {"contexts": robot.contexts, "policies": robot.policies, "outcomes": robot.outcomes}
+    boxes = {"contexts": robot.contexts, "policies": robot.policies, "outcomes": robot.outcomes}
     dims = robot.contexts.dim, robot.policies.dim, robot.outcomes.dim
     with Record(path) as record:
         if record.dims != dims:
             raise RunError(f"{path} has dims {record.dims} of context, theta, outcome, this robot has {dims}")
         for name, given in record.about.get("spaces", {}).items():
-            there, box = Box(*given), here[name]
-            if there.unit != box.unit:
-                raise RunError(f"{name} of {path} are in {there.unit or 'no unit'}, here in {box.unit or 'no unit'}")
-            if name != "outcomes" and not (np.array_equal(there.low, box.low) and np.array_equal(there.high, box.high)):
-                raise RunError(f"{name} of {path} lie in {there.low} to {there.high}, here in {box.low} to {box.high}")
+            recorded, box = Box(*given), boxes[name]
+            if recorded.unit != box.unit:
+                raise RunError(f"{name} of {path} are in {recorded.unit or 'no unit'}, here in {box.unit or 'no unit'}")
+            if name != "outcomes" and not (
+                np.array_equal(recorded.low, box.low) and np.array_equal(recorded.high, box.high)
+            ):
+                raise RunError(
+                    f"{name} of {path} lie in {recorded.low} to {recorded.high}, here in {box.low} to {box.high}"
+                )
         for event in record.events():
             if event.kind in (Kind.MOVED, Kind.ADDED):
                 assert event.context is not None
@@ -80,10 +92,10 @@ def _listed(path: Path, robot: Environment) -> Iterator[Exemplar]:
     more = [f"{name}_{box.dim}" for name, box in boxes.items() if f"{name}_{box.dim}" in heads]
     if lacking or more:
         why = f"lacks the column {lacking[0]}" if lacking else f"has a column {more[0]}, so it is of another robot"
-        raise RunError(f"{path} {why}; this robot needs {', '.join(each for names in wanted for each in names)}")
+        raise RunError(f"{path} {why}; this robot needs {', '.join(name for names in wanted for name in names)}")
     for number, row in enumerate(rows, 2):
         try:
-            context, theta, outcome = (np.array([parsed(row[each] or "", float) for each in names]) for names in wanted)
+            context, theta, outcome = (np.array([parsed(row[name] or "", float) for name in names]) for names in wanted)
         except ValueError as error:
             raise RunError(f"{path}: line {number} is no movement of {sum(map(len, wanted))} numbers") from error
         yield context, theta, outcome

@@ -5,7 +5,6 @@ run = read_run("runs/sgim-d/seed-003"); run.outcomes, run.evaluation["mean_error
 
 from __future__ import annotations
 
-import json
 import os
 import re
 from array import array
@@ -19,9 +18,9 @@ from numpy.typing import NDArray
 from sgimd_torch.evaluation import OwnGoals
 from sgimd_torch.files import checksum
 from sgimd_torch.learner.events import Kind
-from sgimd_torch.options.config import FILES, OWN, PLACE, Config, code_of, differ
+from sgimd_torch.options.config import FILES, OWN, Config, differ
 from sgimd_torch.record import DERIVED, Record, RunError, layout
-from sgimd_torch.runs.directory import FILE, with_found_earlier
+from sgimd_torch.runs.directory import FILE, PLACE, code_of, with_found_earlier
 from sgimd_torch.spaces import Array, Box, Demonstration
 
 Columns = dict[str, np.ndarray]
@@ -47,7 +46,7 @@ class Run:
         demonstration: ``(n,)`` indices in ``demonstrations`` of what was shown just before each movement; -1: nothing.
         failed: ``(n,)``, whether each movement failed.
         contexts, thetas, goals, outcomes: ``(n, dim)`` vectors of each movement; NaN stands for none.
-        answers: columns of the table ``evaluations``, by inverse model.
+        evaluations: columns of the table ``evaluations``, by inverse model.
         errors: columns of the errors at all goals in all evaluations.
         benchmark: ``(n_goals, outcome_dim)`` benchmark goals.
         demonstrations: each demonstration that was shown, once.
@@ -74,7 +73,7 @@ class Run:
     thetas: Array
     goals: Array
     outcomes: Array
-    answers: dict[str, Columns]
+    evaluations: dict[str, Columns]
     errors: Columns = field(default_factory=dict)
     benchmark: Array = field(default_factory=lambda: np.empty((0, 0)))
     demonstrations: list[Demonstration] = field(default_factory=list)
@@ -88,19 +87,19 @@ class Run:
     @property
     def evaluation(self) -> dict[str, Array]:
         """Columns of the evaluations of the run's own inverse model."""
-        return self.answers[OWN]
+        return self.evaluations[OWN]
 
-    def at(self, movements: int, column: str = "mean_error", answer: str = OWN) -> float:
+    def at(self, movements: int, column: str = "mean_error", inverse: str = OWN) -> float:
         """One number of the evaluation after ``movements`` movements, NaN if there is no such evaluation."""
-        evaluation = self.answers.get(answer)
+        evaluation = self.evaluations.get(inverse)
         if evaluation is None:
             return float("nan")
-        found = evaluation[column][evaluation["movements"] == movements]
-        return float(found[0]) if len(found) else float("nan")
+        values = evaluation[column][evaluation["movements"] == movements]
+        return float(values[0]) if len(values) else float("nan")
 
-    def missed_by(self, movements: int, answer: str = OWN) -> tuple[Array, Array]:
+    def missed_by(self, movements: int, inverse: str = OWN) -> tuple[Array, Array]:
         """Errors ``(n_goals,)`` of an evaluation, and those that the learner expected; NaN: it did not say."""
-        now = (self.errors["movements"] == movements) & (self.errors["answer"] == answer)
+        now = (self.errors["movements"] == movements) & (self.errors["inverse"] == inverse)
         return self.errors["error"][now], self.errors["expected"][now]
 
     def own_goals(self) -> OwnGoals:
@@ -108,15 +107,15 @@ class Run:
 
         Imitations, global exploration, which does not aim at its goal, and failed movements are left out.
         """
-        found = OwnGoals(self.config["at_once"])
+        own_goals = OwnGoals(self.config["at_once"])
         own = (
             np.isfinite(self.goals[:, 0])
             & np.isfinite(self.outcomes[:, 0])
             & ~np.isin(self.origin, ("imitate", "global"))
         )
         for row in np.flatnonzero(own).tolist():
-            found.add(row, self.goals[row], self.outcomes[row])
-        return found
+            own_goals.add(row, self.goals[row], self.outcomes[row])
+        return own_goals
 
     def chosen_goals(self) -> Array:
         """``(n, outcome_dim)`` goals that the learner chose, in order; a goal of successive movements is listed once.
@@ -141,21 +140,21 @@ def read_run(path: str | os.PathLike[str]) -> Run:
     if not (path / FILE).exists():
         raise RunError(f"{path} holds no run; runs are in OUT/NAME/seed-000 and have a file {FILE}")
     with Record(path / FILE) as record:
-        about = {name: json.loads(value) for name, value in record.rows("about")}
+        about = record.about
         if "settings" not in about:
             raise RunError(f"{path / FILE} is a life that save_life wrote, not a run")
         settings = about["settings"]
         seed = re.fullmatch(r"seed-(\d+)", path.resolve().name)
         if seed is not None and int(seed[1]) != settings["seed"]:
             raise RunError(f"{path} holds a run of seed {settings['seed']}; was it copied from another run?")
-        shown = record.demonstrations()
+        demonstrations = record.demonstrations()
         arrays, requests = _lived(record)
-        found: dict[str, Columns] = {table: _columns(record, table) for table in DERIVED}
+        derived: dict[str, Columns] = {table: _columns(record, table) for table in DERIVED}
         n = record.movements
-    evaluated = found["evaluations"]["movements"]
-    nothing = not shown and not np.isfinite(arrays["outcomes"]).any()  # the memory is empty, so there is no evaluation
-    met = about.get("met") or [settings["movements"], None]
-    finished = n == met[0] and (settings["evaluate_at"] == [] or n in evaluated or nothing)
+    evaluated = derived["evaluations"]["movements"]
+    is_empty = not demonstrations and not np.isfinite(arrays["outcomes"]).any()  # an empty memory is not evaluated
+    end, expected = about["ended_early"] or (settings["movements"], None)
+    finished = n == end and (settings["evaluate_at"] == [] or n in evaluated or is_empty)
     return Run(
         path=path,
         config=settings,
@@ -169,17 +168,17 @@ def read_run(path: str | os.PathLike[str]) -> Run:
             "movements": n,
             "failed": int(arrays["failed"].sum()),
             "finished": bool(finished),
-            "expected": met[1],
+            "expected": expected,
             **about.get("seconds", {}),
         },
         **arrays,
-        answers=_by_answer(found["evaluations"]),
-        errors=found["errors"],
-        benchmark=np.stack(list(found["goals"].values())[1:], axis=1),
-        demonstrations=shown,
-        regions=_if_any(found["regions"]),
-        predictions=_if_any(found["predictions"]),
-        refreshes=_if_any(found["refreshes"]),
+        evaluations=_by_inverse(derived["evaluations"]),
+        errors=derived["errors"],
+        benchmark=np.stack(list(derived["goals"].values())[1:], axis=1),
+        demonstrations=demonstrations,
+        regions=_if_any(derived["regions"]),
+        predictions=_if_any(derived["predictions"]),
+        refreshes=_if_any(derived["refreshes"]),
         requests=requests,
     )
 
@@ -191,7 +190,7 @@ def _if_any(columns: Columns) -> Columns | None:
 def _lived(record: Record) -> tuple[dict[str, Any], Columns | None]:
     """Movements as arrays by attribute of `Run`, and requests as columns or None."""
     c, p, t = record.dims
-    origins, shown, cells, requests = list[str](), array("q"), array("d"), list[dict[str, Any]]()
+    origins, demonstration, cells, requests = list[str](), array("q"), array("d"), list[dict[str, Any]]()
     changes, failed = list[str](), list[bool]()
     lessons = dict[int, int]()  # lessons by number of the next movement of the robot that was shown them
     for _, kind, origin, *vectors, lesson, who, strategy, reply, place in record.rows("events"):
@@ -207,16 +206,16 @@ def _lived(record: Record) -> tuple[dict[str, Any], Columns | None]:
             changes.append(reply)
         elif kind in (Kind.MOVED, Kind.RESTED, Kind.FAILED):
             failed.append(kind == Kind.FAILED)
-            shown.append(lessons.pop(len(origins), -1))
+            demonstration.append(lessons.pop(len(origins), -1))
             origins.append(origin or "")
             cells.extend(np.nan if value is None else value for value in vectors)
     n = len(origins)
     vectors_of = np.split(np.array(cells).reshape(n, c + p + 2 * t), (c, c + p, c + p + t), axis=1)
-    found: dict[str, Any] = {"changes": changes, "failed": np.array(failed, np.bool_), "index": np.arange(n)}
-    found |= {"origin": np.array(origins, np.str_), "demonstration": np.array(shown, np.int64)}
-    found |= dict(zip(("contexts", "thetas", "goals", "outcomes"), vectors_of, strict=True))
-    columns = {name: np.array([each[name] for each in requests]) for name in requests[0]} if requests else None
-    return found, columns
+    arrays: dict[str, Any] = {"changes": changes, "failed": np.array(failed, np.bool_), "index": np.arange(n)}
+    arrays |= {"origin": np.array(origins, np.str_), "demonstration": np.array(demonstration, np.int64)}
+    arrays |= dict(zip(("contexts", "thetas", "goals", "outcomes"), vectors_of, strict=True))
+    columns = {name: np.array([request[name] for request in requests]) for name in requests[0]} if requests else None
+    return arrays, columns
 
 
 def _columns(record: Record, table: str) -> Columns:
@@ -257,23 +256,23 @@ def find_runs(place: str | os.PathLike[str]) -> dict[str, list[Path]]:
     Raises:
         RunError: there are no runs, or no such folder.
     """
-    place, found = Path(place), dict[str, list[Path]]()
+    place, paths = Path(place), dict[str, list[Path]]()
     for pattern in ("", "seed-*/", "*/seed-*/"):
         for file in sorted(place.glob(pattern + FILE)):
-            found.setdefault(Path(os.path.abspath(file)).parent.parent.name, []).append(file.parent)
-    if not found:
+            paths.setdefault(Path(os.path.abspath(file)).parent.parent.name, []).append(file.parent)
+    if not paths:
         why = "holds no runs" if place.is_dir() else "is a file, not a folder" if place.exists() else "does not exist"
         raise RunError(f"{place} {why}; runs are in OUT/NAME/seed-000")
-    return found
+    return paths
 
 
 def finished(config: Config) -> bool:
     """Whether an undamaged run with these settings is on disk, complete with its last evaluation."""
     try:
         run, wanted = read_run(config.directory), with_found_earlier(config).settings
-        found = run.config
-        names = (found.keys() | wanted.keys()) - {*PLACE}
-        others = any(differ(found.get(name), wanted.get(name)) for name in names)
+        settings = run.config
+        names = (settings.keys() | wanted.keys()) - {*PLACE}
+        others = any(differ(settings.get(name), wanted.get(name)) for name in names)
         return bool(run.summary["finished"] and not others) and all(
             config[name] is None or run.files.get(f"{name}_crc32") in (None, checksum(config[name])) for name in FILES
         )
@@ -290,10 +289,10 @@ def movements_on_disk(path: Path) -> int:
         return 0
 
 
-def _by_answer(columns: Columns) -> dict[str, Columns]:
+def _by_inverse(columns: Columns) -> dict[str, Columns]:
     """The evaluations of each inverse model, by its name; the run's own inverse model is always there, as ``OWN``."""
-    words = columns["answer"]
+    words = columns["inverse"]
     return {
-        word: {name: values[words == word] for name, values in columns.items() if name != "answer"}
+        word: {name: values[words == word] for name, values in columns.items() if name != "inverse"}
         for word in dict.fromkeys((OWN, *words.tolist()))
     }

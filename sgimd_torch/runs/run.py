@@ -1,6 +1,6 @@
 """One run: replay its record, make new movements, evaluate now and then. Listeners do everything else.
 
-print(run_one(build(Config(seed=3)), stopping, resume=False, accept_loss=False, again="sgimd run --seed 3 --resume"))
+print(run_one(build(Config(seed=3)), stopping, resume=False, again="sgimd run --seed 3 --resume"))
 """
 
 from __future__ import annotations
@@ -26,18 +26,17 @@ from sgimd_torch.runs.signals import Failed, Progress, Stopped, Stopping, say
 from sgimd_torch.session import NoOutcomeError, reason_of, run
 from sgimd_torch.spaces import Episode
 
-TOLD: Final = 3  # first failures, with a message each; later ones are only counted
+N_TOLD: Final = 3  # number of failures with a message each; later ones are only counted
 COMMIT_EVERY: Final = 1.0  # s between two commits; a killed run loses the movements since the last commit
 
 
-def run_one(parts: RunParts, stopping: Stopping, *, resume: bool, accept_loss: bool, again: str) -> str:
+def run_one(parts: RunParts, stopping: Stopping, *, resume: bool, again: str) -> str:
     """Make a run, or go on with one, and return its result as one line.
 
     Args:
         parts: parts of the run.
         stopping: object that knows whether a signal has come.
         resume: true to go on with the run in the folder.
-        accept_loss: true to go on even if the record has damaged movements.
         again: command that resumes the run, for messages.
 
     Raises:
@@ -45,23 +44,23 @@ def run_one(parts: RunParts, stopping: Stopping, *, resume: bool, accept_loss: b
         Failed: the run failed after its beginning.
         Stopped: a signal stopped the run.
     """
-    with RunLoop(parts, resume=resume, accept_loss=accept_loss) as life:
+    with RunLoop(parts, resume=resume) as loop:
         try:
-            life.go_on(stopping)
+            loop.go_on(stopping)
         except Stopped:
-            say(f"stopped after {life.movements} movements; to go on: {again}")
+            say(f"stopped after {loop.movements} movements; to go on: {again}")
             raise
         except (ReplayError, RunError) as error:
             raise RunError(str(error)) from error
         except OSError as error:
-            raise Failed(f"{life.record.path} cannot be written: {reason_of(error)}; to go on: {again}") from error
+            raise Failed(f"{loop.record.path} cannot be written: {reason_of(error)}; to go on: {again}") from error
         except (Exception, SystemExit) as error:  # an error of a part, or too many failed movements
             raised = error.__cause__ if isinstance(error, NoOutcomeError) and error.__cause__ else error
             if not isinstance(raised, SimulationError):
                 say("".join(traceback.format_exception(raised)).rstrip())
             said = str(error) if raised is not error else reason_of(error)
-            raise Failed(f"{said}; {life.movements} movements are kept; to go on: {again}") from error
-        return life.summary
+            raise Failed(f"{said}; {loop.movements} movements are kept; to go on: {again}") from error
+        return loop.summary
 
 
 class RunLoop:
@@ -70,7 +69,7 @@ class RunLoop:
     It is a context manager. Leaving it writes the last movements to the disk, except after Ctrl-C.
 
     Args:
-        parts, resume, accept_loss: arguments of ``run_one``.
+        parts, resume: arguments of ``run_one``.
 
     Attributes:
         record: record of the run; new movements are written to it after the replay.
@@ -80,9 +79,9 @@ class RunLoop:
         RunError, OSError: see ``open_run``.
     """
 
-    def __init__(self, parts: RunParts, *, resume: bool, accept_loss: bool = False) -> None:
+    def __init__(self, parts: RunParts, *, resume: bool) -> None:
         self.parts = parts
-        self.record, notes = open_run(parts, resume=resume, accept_loss=accept_loss)
+        self.record, notes = open_run(parts, resume=resume)
         say(*parts.notes, *notes)
         self.movements, self.recorded, self.failed = 0, self.record.movements, 0
         self.seconds = Seconds(self.record.about.get("seconds", {}))
@@ -96,8 +95,8 @@ class RunLoop:
 
             board = BoardListener(parts.config.directory, parts, self.seconds.summary, self._curves)
             self.listeners.append(board)
-        self._wanted = {each: self.evaluations.size(each) for each in parts.config.evaluations}  # by movements before
-        self._committed = time.monotonic()
+        self._wanted = parts.config.evaluations  # numbers of movements before the evaluations to come
+        self._committed_at = time.monotonic()
 
     def __enter__(self) -> Self:
         return self
@@ -114,8 +113,8 @@ class RunLoop:
                 self._keep()
         finally:
             self.record.close()
-            for each in self.listeners:
-                each.close()
+            for listener in self.listeners:
+                listener.close()
 
     @property
     def replaying(self) -> bool:
@@ -125,34 +124,31 @@ class RunLoop:
     @property
     def summary(self) -> str:
         """Result of the run, as one line."""
-        last, found = self.evaluations.last, "not evaluated"
+        last, result = self.evaluations.last, "not evaluated"
         if last is not None:
             floor = last.noise_floor
             amount = self.parts.environment.outcomes.amount
             measured = "not measured" if math.isnan(floor) else amount(floor, ".4f")
-            found = f"mean error {amount(last.mean_error, '.4f')}, noise floor {measured}"
+            result = f"mean error {amount(last.mean_error, '.4f')}, noise floor {measured}"
             if last.failed.any():
-                found += f" ({last.failed.sum()} of {len(last.failed)} movements of the evaluation failed)"
+                result += f" ({last.failed.sum()} of {len(last.failed)} movements of the evaluation failed)"
         failed = f" ({self.failed} failed)" if self.failed else ""
-        met = self.record.about["met"]
-        early = f", ended early as it expected {self.parts.environment.outcomes.amount(met[1], '.4f')}" if met else ""
-        return f"{self.parts.config.directory}: {self.movements} movements{failed}, {found}{early}"
+        ended_early, unit = self.record.about["ended_early"], self.parts.environment.outcomes.amount
+        early = f", ended early as it expected {unit(ended_early[1], '.4f')}" if ended_early else ""
+        return f"{self.parts.config.directory}: {self.movements} movements{failed}, {result}{early}"
 
     def go_on(self, stopping: Stopping) -> None:
         """Make all movements, or stop after the movement during which ``stopping`` has heard a signal."""
         total, title = self.parts.config.movements, self.parts.config.title
         unit = self.parts.environment.outcomes.amount
-        before = self.seconds.summary()["seconds_evaluation"]
         self.evaluations.between = partial(self._stop_if, stopping)
         with Progress("replaying" if self.recorded else title, self.recorded or total) as progress:
             for _ in self.episodes():
                 last = self.evaluations.last
                 note = "" if last is None else f"error {unit(last.mean_error, '.4f')}"
-                spent = self.seconds.summary()["seconds_evaluation"]
-                progress.show(self.movements, note, spent=spent - before, later=self._later)
+                progress.show(self.movements, note)
                 if self.movements == self.recorded < total:
                     progress.begin(title, total, self.movements)
-                    before = spent
                 self._stop_if(stopping)
         self.commit()
 
@@ -189,29 +185,17 @@ class RunLoop:
 
     def commit(self) -> None:
         """Write everything to the disk, unless another program is reading the record: then later."""
-        self._committed = time.monotonic()
-        if self._settle():
-            for each in self.listeners:
-                each.flush()
+        self._committed_at = time.monotonic()
+        if self._try_commit():
+            for listener in self.listeners:
+                listener.flush()
 
     def _keep(self) -> None:
         """Write the last movements to the disk, as soon as no other program reads the record."""
-        if not self.replaying and not self._settle():
+        if not self.replaying and not self._try_commit():
             say(f"waiting until no other program reads {self.record.path}, to write the last movements")
-            while not self._settle():
+            while not self._try_commit():
                 time.sleep(COMMIT_EVERY)
-
-    @property
-    def _later(self) -> float:
-        """Time (s) of the evaluations to come, if their movements take as long as those of the evaluations so far.
-
-        Before the first evaluation: as long as those of the run.
-        """
-        if self.replaying:
-            return 0.0
-        seconds, made = self.seconds.summary(), self.evaluations.made
-        each = seconds["seconds_evaluation"] / made if made else seconds["seconds_physics"] / self.movements
-        return each * sum(self._wanted.values())
 
     def _stop_if(self, stopping: Stopping) -> None:
         """Stop between two movements of the run or of an evaluation, if a signal was heard."""
@@ -225,10 +209,10 @@ class RunLoop:
 
     def _curves(self) -> dict[str, float]:
         """Numbers of the listeners for the board since the last call, by tag."""
-        return {tag: value for each in self.listeners for tag, value in each.curves().items()}
+        return {tag: value for listener in self.listeners for tag, value in listener.curves().items()}
 
-    def _settle(self) -> bool:
-        self.record.settle(seconds=self.seconds.summary())
+    def _try_commit(self) -> bool:
+        self.record.about["seconds"] = self.seconds.summary()
         return self.record.commit(wait=False)
 
     def _after(self, episode: Episode) -> None:
@@ -236,19 +220,17 @@ class RunLoop:
         self.movements = episode.index + 1
         if episode.failed:
             self.failed += 1
-            if not replayed and self.failed <= TOLD:
-                more = "; further failures are only counted" if self.failed == TOLD else ""
+            if not replayed and self.failed <= N_TOLD:
+                more = "; further failures are only counted" if self.failed == N_TOLD else ""
                 say(f"movement {episode.index} failed: {episode.failed}{more}")
-        for each in self.listeners:
-            each.episode(episode, replayed)
-        due = [moment for moment in self._wanted if moment <= self.movements]
-        if due and self._all_told:
-            for moment in due:
-                del self._wanted[moment]
+        for listener in self.listeners:
+            listener.episode(episode, replayed)
+        if self._wanted and self._wanted[0] <= self.movements and self._all_told:
+            self._wanted = [movements for movements in self._wanted if movements > self.movements]
             self._evaluate()
         if self.movements == self.recorded:
             self._begin()
-        if not self.replaying and time.monotonic() - self._committed >= COMMIT_EVERY:
+        if not self.replaying and time.monotonic() - self._committed_at >= COMMIT_EVERY:
             self.commit()
 
     def _ends_early(self) -> bool:
@@ -265,18 +247,18 @@ class RunLoop:
 
     def _evaluate(self) -> None:
         with self.seconds.of("evaluation"):
-            found = self.evaluations.after(self.movements)
-        if found is None:
+            evaluations = self.evaluations.after(self.movements)
+        if evaluations is None:
             return
-        for each in self.listeners:
-            each.evaluated(self.movements, found)
+        for listener in self.listeners:
+            listener.evaluated(self.movements, evaluations)
         if not self.replaying:
             self.commit()
 
     def _begin(self) -> None:
         """The replay is over: from now on files change."""
-        for each in self.listeners:
-            each.begin()
+        for listener in self.listeners:
+            listener.begin()
         self.commit()
 
 
@@ -290,8 +272,8 @@ class Listener(Protocol):
         """A movement was made, or replayed."""
         return
 
-    def evaluated(self, movements: int, found: Mapping[str, Evaluation]) -> None:
-        """The learner was evaluated after ``movements`` movements; ``found`` is by name of the inverse model."""
+    def evaluated(self, movements: int, evaluations: Mapping[str, Evaluation]) -> None:
+        """The learner was evaluated after ``movements`` movements; ``evaluations`` are by name of the inverse model."""
         return
 
     def begin(self) -> None:
@@ -315,8 +297,8 @@ class Listener(Protocol):
 class Listening(Protocol):
     """A trained part of a learner that has a listener in a run."""
 
-    def listener(self, life: RunLoop) -> Listener:
-        """The listener in the run ``life``."""
+    def listener(self, loop: RunLoop) -> Listener:
+        """The listener in the run of this ``loop``."""
 
 
 class Seconds:

@@ -20,7 +20,7 @@ from functools import partial
 from types import FrameType
 from typing import Any, Final, Self, TextIO
 
-from sgimd_torch.options.signature import parsed, wanted
+from sgimd_torch.options.signature import parsed
 
 REPORT_EVERY: Final = 20.0  # s between two lines of progress if stderr is no terminal
 SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
@@ -104,8 +104,8 @@ def parsed_argument(text: str, kind: Any) -> Any:
     """
     try:
         return parsed(text, kind)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"must be {wanted(kind)}, got {text.strip()!r}") from None
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def _sink() -> TextIO:
@@ -202,31 +202,24 @@ class Progress:
         if self._bar is not None:
             self._bar.close()
         self._title, self.total, self._first = title, total, done
-        form = {"unit": " movements", "dynamic_ncols": True, "smoothing": 0.02, "disable": not sys.stderr.isatty()}
+        form = {"unit": " movements", "dynamic_ncols": True, "smoothing": 0, "disable": not sys.stderr.isatty()}
         self._bar = tqdm(desc=title, initial=done, total=total, **form)
         self._begun = self._reported = time.monotonic()
 
-    def show(self, done: int, note: str = "", *, spent: float = 0.0, later: float = 0.0) -> None:
-        """Show that ``done`` movements are made, earlier ones included.
+    def show(self, done: int, note: str = "") -> None:
+        """Show that ``done`` movements are made, earlier ones included, with a ``note`` beside the bar.
 
-        Args:
-            done: number of movements.
-            note: text beside the bar.
-            spent: time (s) since `begin` that was spent on other things than movements, such as evaluations.
-            later: time (s) that such things will take.
+        The time that is left is that of the movements so far, their evaluations included.
         """
-        now = time.monotonic()
-        rate = (done - self._first) / max(now - self._begun - spent, 1e-9)
-        left = self._bar.format_interval((self.total - done) / rate + later) if rate else "?"
-        self._bar.bar_format = (
-            f"{{l_bar}}{{bar}}| {{n_fmt}}/{{total_fmt}} [{{elapsed}}<{left}, {{rate_fmt}}{{postfix}}]"
-        )
         self._bar.total = self.total
         self._bar.set_postfix_str(note, refresh=False)
         self._bar.update(done - self._bar.n)
+        now = time.monotonic()
         if not self._bar.disable or now - self._reported < REPORT_EVERY or done <= self._first:
             return
         self._reported = now
+        rate = (done - self._first) / (now - self._begun)
+        left = self._bar.format_interval((self.total - done) / rate)
         parts = [f"{done} of {self.total} movements", f"{rate:.3g}/s", f"{left} left", note]
         say(f"{self._title}: {', '.join(filter(None, parts))}")
 

@@ -56,18 +56,17 @@ def parser() -> argparse.ArgumentParser:
 def main(argv: Sequence[str] | None = None) -> int:
     """Carry out all unfinished runs; return the exit code, which is 1 if runs failed."""
     options, rest = parser().parse_known_args(argv)
-    variants, flags = variants_of(options.vary, rest)
+    variants = variants_of(options.vary, rest)
     configs = [replace(variant, seed=seed) for seed in options.seeds for variant in variants]
-    return run_all(configs, options, flags, variants[0].out)
+    return run_all(configs, options, variants[0].out)
 
 
-def run_all(whole: Sequence[Config], options: argparse.Namespace, flags: Sequence[str], out: Path) -> int:
+def run_all(whole: Sequence[Config], options: argparse.Namespace, out: Path) -> int:
     """Carry out the unfinished runs of a study, or list them; return the exit code, which is 1 if runs failed.
 
     Args:
         whole: all runs of the study.
         options: parsed options of ``add_options``.
-        flags: flags of ``sgimd run`` for all runs, besides --resume.
         out: folder of the study.
 
     Raises:
@@ -83,10 +82,10 @@ def run_all(whole: Sequence[Config], options: argparse.Namespace, flags: Sequenc
         return 0
     with loading():
         from sgimd_torch.options.build import build  # imported here so that --help is fast
-    for config in {each.directory.parent: each for each in left}.values():
+    for config in {config.directory.parent: config for config in left}.values():
         build(config)  # wrong options raise an error before any run starts
     make_folder(out)
-    failures = sweep(left, options.processes, flags=flags)
+    failures = sweep(left, options.processes)
     say(f"{len(left) - len(failures)} runs ended well, {len(failures)} failed: {out}", *failures)
     return 1 if failures else 0
 
@@ -143,16 +142,15 @@ class Shard(NamedTuple):
         return f", shard {self.k}/{self.n} of {len(whole)} runs" if self.n > 1 else ""
 
 
-def variants_of(varied: Sequence[str], options: Sequence[str]) -> tuple[list[Config], list[str]]:
-    """A run for every combination of varied values, named after them, and the flags among ``options``.
+def variants_of(varied: Sequence[str], options: Sequence[str]) -> list[Config]:
+    """A run for every combination of varied values, named after them.
 
     Args:
         varied: values of --vary, such as ``["goals=interest-map,uniform", "budget=5,15"]``.
         options: options of ``sgimd run`` for all runs.
 
     Raises:
-        ValueError: an option cannot be varied, or is given twice.
-        SystemExit: ``sgimd run`` refused an option and printed the reason.
+        ValueError: an option cannot be varied, is given twice, or is refused by ``sgimd run``.
     """
     given = [dashed(word.partition("=")[0].removeprefix("--")) for word in options if word.startswith("--")]
     values: dict[str, list[str]] = {}
@@ -168,13 +166,13 @@ def variants_of(varied: Sequence[str], options: Sequence[str]) -> tuple[list[Con
     for option, instead in NOT_VARIED.items():
         if option in values or (option in given and option != "out"):
             raise ValueError(f"--{option} cannot be given here: {instead}")
-    found = []
+    variants = []
     for combination in itertools.product(*values.values()):
         chosen = dict(zip(values, combination, strict=True))
-        config, flags = parse([*options, *(f"--{option}={value}" for option, value in chosen.items())])
+        config, _ = parse([*options, *(f"--{option}={value}" for option, value in chosen.items())])
         in_order = sorted(chosen, key=lambda option: (option != "algorithm", option))
-        found.append(replace(config, name=",".join(_in_name(option, chosen[option]) for option in in_order) or None))
-    return found, [f"--{dashed(flag)}" for flag, on in flags.items() if on]
+        variants.append(replace(config, name=",".join(_in_name(option, chosen[option]) for option in in_order) or None))
+    return variants
 
 
 def _in_name(option: str, value: str) -> str:

@@ -10,8 +10,8 @@ from collections.abc import Generator
 
 import numpy as np
 
-from sgimd_torch.explore.widening import Width
 from sgimd_torch.parts import Problem, Search
+from sgimd_torch.searches.explore import Width
 from sgimd_torch.spaces import Array, Estimate
 
 

@@ -1,8 +1,7 @@
-"""A map of T with the predicted error of a learner at each place.
+"""A map of T: the distance from each place to the nearest outcome that the learner remembers.
 
-    chart = chart_of(robot, memory, benchmark); picture = by_error(chart, robot.outcomes)
-The predicted error at a goal is the distance from the goal to the nearest outcome in memory. No movement is executed,
-so a map takes milliseconds.
+    chart = chart_of(robot, memory, benchmark); colours = picture_of(chart, robot.outcomes)
+No movement is executed and no inverse model is asked (1 ms a place), so a map takes milliseconds.
 """
 
 from __future__ import annotations
@@ -20,46 +19,44 @@ from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, Box
 
 CELLS: Final = 60  # number of cells along each side of the map
-FAR: Final = 0.25  # predicted error of the darkest colour, as a share of T's longer side
-Colours = NDArray[np.uint8]
-
-# Colours from a large predicted error (dark) to none (light). They differ in brightness, for colour-blind readers.
-SKILL: Final = np.array([[33, 60, 96], [40, 107, 142], [58, 154, 155], [135, 199, 132], [246, 232, 120]], float)
+FAR: Final = 0.25  # distance of the darkest colour, as a share of T's longer side
+# Colours from a large distance (dark) to none (light). They differ in brightness, for colour-blind readers.
+COLOURS: Final = np.array([[33, 60, 96], [40, 107, 142], [58, 154, 155], [135, 199, 132], [246, 232, 120]], float)
 
 
 @dataclass(frozen=True, eq=False)
 class Chart:
-    """The predicted errors of a learner.
+    """Distances to the nearest outcomes of a learner, in the unit of T.
 
     Attributes:
-        error: ``(CELLS, CELLS)`` predicted error (m), with a row for each y and a column for each x.
-        mean_error: mean predicted error (m) at the goals of the benchmark.
-        met: ``(n_goals,)`` mask of the goals whose predicted error is at most half the side of a benchmark tile.
+        distances: ``(CELLS, CELLS)`` distance from each cell, with a row for each y and a column for each x.
+        mean_distance: mean distance from the goals of the benchmark.
+        reached: ``(n_goals,)`` mask of the goals whose distance is at most half the side of a benchmark tile.
     """
 
-    error: Array
-    mean_error: float
-    met: NDArray[np.bool_]
+    distances: Array
+    mean_distance: float
+    reached: NDArray[np.bool_]
 
 
 def chart_of(robot: Environment, memory: Memory, benchmark: Benchmark) -> Chart:
-    """The predicted errors of a learner in the context at the middle of C.
+    """The map of a learner for the context at the middle of C.
 
     Args:
         robot: environment; the map spans the first two dimensions of its T, at the middle of its other dimensions.
         memory: memory of the learner; only read.
-        benchmark: goals over which the error is averaged, and the side of their tiles.
+        benchmark: goals over which the distance is averaged, and the side of their tiles.
     """
     places = np.concatenate([_cells(robot.outcomes), benchmark.goals])
     if len(memory):
-        near = KDTree(np.concatenate([memory.contexts, memory.outcomes], axis=1))
+        tree = KDTree(np.concatenate([memory.contexts, memory.outcomes], axis=1))
         context = robot.contexts.low + robot.contexts.sides / 2
-        rows = np.concatenate([np.tile(context, (len(places), 1)), places], axis=1)
-        nearest = memory.outcomes[near.query(rows)[1]]
+        queries = np.concatenate([np.tile(context, (len(places), 1)), places], axis=1)
+        nearest = memory.outcomes[tree.query(queries)[1]]
     else:
         nearest = np.tile(robot.rest, (len(places), 1))
-    error, at_goals = np.split(np.linalg.norm(nearest - places, axis=1), [CELLS**2])
-    return Chart(error.reshape(CELLS, CELLS), float(at_goals.mean()), at_goals <= benchmark.side / 2)
+    of_cells, of_goals = np.split(np.linalg.norm(nearest - places, axis=1), [CELLS**2])
+    return Chart(of_cells.reshape(CELLS, CELLS), float(of_goals.mean()), of_goals <= benchmark.side / 2)
 
 
 def _cells(outcomes: Box) -> Array:
@@ -70,8 +67,8 @@ def _cells(outcomes: Box) -> Array:
     return outcomes.low + shares.reshape(-1, outcomes.dim) * outcomes.sides
 
 
-def by_error(chart: Chart, outcomes: Box) -> Colours:
-    """Picture ``(CELLS, CELLS, 3)`` of the predicted error, y upwards: light where it is small, dark where large."""
-    skill = np.clip(1 - chart.error[::-1] / (FAR * outcomes.sides[:2].max()), 0, 1)
-    places = np.linspace(0, 1, len(SKILL))
-    return np.stack([np.interp(skill, places, channel) for channel in SKILL.T], axis=-1).astype(np.uint8)
+def picture_of(chart: Chart, outcomes: Box) -> NDArray[np.uint8]:
+    """Picture ``(CELLS, CELLS, 3)`` of the distances, y upwards: light where they are small, dark where large."""
+    lightness = np.clip(1 - chart.distances[::-1] / (FAR * outcomes.sides[:2].max()), 0, 1)
+    steps = np.linspace(0, 1, len(COLOURS))
+    return np.stack([np.interp(lightness, steps, channel) for channel in COLOURS.T], axis=-1).astype(np.uint8)

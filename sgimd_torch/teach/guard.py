@@ -19,8 +19,9 @@ import websockets.asyncio.server
 from websockets.datastructures import MultipleValuesError
 from websockets.http11 import Request, Response
 
-Process = Callable[[Any, Request], Response | None]
-OWN: Final = ("127.0.0.1", "localhost", "::1")
+Answer = Callable[[Any, Request], Response | None]
+"""Function (connection, request) -> response, None for a request that opens a websocket."""
+THIS_MACHINE: Final = ("127.0.0.1", "localhost", "::1")
 LONGEST: Final = 200  # largest length of an address; viser looks it up as a file name, which has at most 255 bytes
 
 
@@ -33,11 +34,11 @@ def guarded(token: str) -> Iterator[None]:
     """
     serve, started = websockets.asyncio.server.serve, []
 
-    def guarding(*given: Any, process_request: Process, **options: Any) -> Any:
+    def serve_guarded(*arguments: Any, process_request: Answer, **options: Any) -> Any:
         started.append(True)
-        return serve(*given, process_request=guard(token, process_request), **options)
+        return serve(*arguments, process_request=guard(token, process_request), **options)
 
-    websockets.asyncio.server.serve = guarding  # type: ignore[assignment,misc]
+    websockets.asyncio.server.serve = serve_guarded  # type: ignore[assignment,misc]
     try:
         yield
     finally:
@@ -46,11 +47,11 @@ def guarded(token: str) -> Iterator[None]:
         raise RuntimeError("this version of viser starts its server in another way, so nothing would guard the page")
 
 
-def guard(token: str, process: Process) -> Process:
-    """A wrapper of ``process`` that refuses requests without the token, and requests from pages of other machines."""
+def guard(token: str, answer: Answer) -> Answer:
+    """A wrapper of ``answer`` that refuses requests without the token, and requests from pages of other machines."""
     name = f"teach-{hmac.digest(token.encode(), b'cookie', 'sha256').hex()[:8]}"
 
-    def guarded(connection: Any, request: Request) -> Response | None:
+    def answer_guarded(connection: Any, request: Request) -> Response | None:
         def refused(status: http.HTTPStatus) -> Response:
             refusal: Response = connection.respond(status, f"{status.phrase}\n")
             return refusal
@@ -58,20 +59,18 @@ def guard(token: str, process: Process) -> Process:
         if len(request.path) > LONGEST:
             return refused(http.HTTPStatus.REQUEST_URI_TOO_LONG)
         try:
-            host, origin, cookies = (request.headers.get(each) for each in ("Host", "Origin", "Cookie"))
-            own = urlsplit(f"//{host}").hostname in OWN and origin in (None, f"http://{host}")
-            typed = parse_qs(urlsplit(request.path).query).get("token", [""])[0]
+            host, origin, cookies = (request.headers.get(header) for header in ("Host", "Origin", "Cookie"))
+            is_own = urlsplit(f"//{host}").hostname in THIS_MACHINE and origin in (None, f"http://{host}")
+            in_address = parse_qs(urlsplit(request.path).query).get("token", [""])[0]
             cookie = SimpleCookie(cookies).get(name)
         except (ValueError, CookieError, MultipleValuesError):  # no browser sends such headers
-            own = False
-        if not own:
             return refused(http.HTTPStatus.FORBIDDEN)
-        shown = typed or ("" if cookie is None else cookie.value)
-        if not hmac.compare_digest(shown.encode(), token.encode()):
+        received = in_address or ("" if cookie is None else cookie.value)
+        if not is_own or not hmac.compare_digest(received.encode(), token.encode()):
             return refused(http.HTTPStatus.FORBIDDEN)
-        response = process(connection, request)
-        if response is not None and typed:
+        response = answer(connection, request)
+        if response is not None and in_address:
             response.headers["Set-Cookie"] = f"{name}={token}; HttpOnly; SameSite=Strict; Path=/"
         return response
 
-    return guarded
+    return answer_guarded

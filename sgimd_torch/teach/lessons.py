@@ -21,7 +21,6 @@ from sgimd_torch.runs.tasks.taught import correspondence_of
 from sgimd_torch.spaces import Array, Demonstration, read_only
 from sgimd_torch.teach.led import HandLed, hand_led_of
 
-RATE: Final = 50.0  # Hz, sampling rate of the shipped demonstrations and of motor primitives
 FASTER: Final = 1.02  # multiple of the robot's largest speed; a joint that was led faster gets a remark
 AWAY: Final = 0.05  # rad; a recording that starts farther from the start of movements gets a remark
 
@@ -61,21 +60,14 @@ def lesson_by_hand(times: Array, joints: Array, task: Task, rng: np.random.Gener
     robot, led = task.environment, hand_led_of(task)
     longest = primitive_of(robot).durations[1]
     played = times / times[-1] * longest if times[-1] > longest else times  # the last time equals longest exactly
-    even, trajectory = resampled(played, joints)
-    theta_d = robot.policies.check("theta_d", correspondence_of(task)(even, trajectory))
+    theta_d = robot.policies.check("theta_d", correspondence_of(task)(played, joints))
     context = robot.contexts.low + robot.contexts.sides / 2
-    shown = Demonstration(context, even, trajectory, robot.execute(context, theta_d.copy(), rng))
-    remarks = (*_unlike_led(times, played, joints, led), *beyond_limits(robot, shown))
-    return HandLesson(shown, read_only(theta_d), misfit_of(robot, theta_d, shown), remarks)
+    demonstration = Demonstration(context, played, joints, robot.execute(context, theta_d.copy(), rng))
+    remarks = (*_differences(times, played, joints, led), *beyond_limits(robot, demonstration))
+    return HandLesson(demonstration, read_only(theta_d), misfit_of(robot, theta_d, demonstration), remarks)
 
 
-def resampled(times: Array, joints: Array) -> tuple[Array, Array]:
-    """The recording at equal time steps, at least ``RATE`` steps per s, with its first and its last posture."""
-    even = np.linspace(0.0, times[-1], max(2, int(np.ceil(times[-1] * RATE - 1e-9)) + 1))
-    return even, np.stack([np.interp(even, times, column) for column in joints.T], axis=1)
-
-
-def _unlike_led(times: Array, played: Array, joints: Array, led: HandLed) -> list[str]:
+def _differences(times: Array, played: Array, joints: Array, led: HandLed) -> list[str]:
     """A sentence for each way in which the robot's repetition at the times ``played`` must differ from a recording."""
     remarks = []
     if times[-1] > played[-1]:

@@ -62,7 +62,7 @@ class Page:
         self.running = False
         self._before: Status | None = None  # status before a given lesson, until the effect of the lesson is shown
         self._given = False  # whether there is a lesson that the learner has not begun to imitate
-        self._tasks: SimpleQueue[Callable[[], object]] = SimpleQueue()
+        self._actions: SimpleQueue[Callable[[], object]] = SimpleQueue()
         self._learner = ThreadPoolExecutor(1)
         self._moving: Future[Status] | None = self._learner.submit(taught.status)
         for body, handle in self.scene.grips:
@@ -71,7 +71,7 @@ class Page:
         # All callbacks are coroutines, because viser may call plain functions out of order.
         @server.on_client_disconnect
         async def _(client: viser.ClientHandle) -> None:
-            self._tasks.put(self._tab_closed)
+            self._actions.put(self._tab_closed)
 
     def run(self, stopped: Callable[[], bool] = lambda: False) -> None:
         """Serve until ``stopped()`` is true or the taught run fails; then tell viewers that the session has ended."""
@@ -99,7 +99,12 @@ class Page:
             if not self._moving.done():
                 return
             self.status, self._moving = self._moving.result(), None
-            self._show_status(self.status)
+            self.panel.show_status(self.status, self.running)
+            self.scene.draw_map(self.status.chart)
+            self.scene.draw_outcomes(self.status.outcomes)
+            if self._before is not None and not self._given:
+                self.panel.show_effect(self._before.chart, self.status.chart)
+                self._before = None
         assert self.status is not None
         left = self.status.movements < self.taught.config.movements
         if self._given:
@@ -107,36 +112,28 @@ class Page:
         elif self.status.replaying or (self.running and left):
             self._moving = self._learner.submit(self.taught.go_on, BLOCK)
 
-    def _show_status(self, status: Status) -> None:
-        self.panel.show_status(status, self.running)
-        self.scene.draw_map(status.chart)
-        self.scene.draw_landings(status.landed)
-        if self._before is not None and not self._given:
-            self.panel.show_effect(self._before.chart, status.chart)
-            self._before = None
-
     def _work_until(self, until: float) -> None:
         """Perform the queued actions of viewers until the time ``until``."""
         with contextlib.suppress(Empty):
             while True:
-                self._tasks.get(timeout=max(0.0, until - time.monotonic()))()
+                self._actions.get(timeout=max(0.0, until - time.monotonic()))()
 
     def _listen_to(self, body: str, handle: Any) -> None:
         @handle.on_drag("left")  # type: ignore[untyped-decorator]
         async def _(event: Any) -> None:
             phase, start, end = event.phase, np.array(event.start_position), np.array(event.end_position)
-            self._later(event.client, lambda: self._drag(phase, body, start, end))
+            self._queue(event.client, lambda: self._drag(phase, body, start, end))
 
-    def _later(self, client: viser.ClientHandle, what: Callable[[], object]) -> None:
-        """Queue the action ``what`` of a viewer for the loop; a failure is reported to this viewer."""
+    def _queue(self, client: viser.ClientHandle, action: Callable[[], object]) -> None:
+        """Let the loop perform the ``action`` of a viewer; a failure is reported to this viewer."""
 
-        def carefully() -> None:
+        def act_or_report() -> None:
             try:
-                what()
+                action()
             except (ValueError, RuntimeError, OSError) as error:
                 client.add_notification("That did not work", str(error), color="red", auto_close_seconds=8.0)
 
-        self._tasks.put(carefully)
+        self._actions.put(act_or_report)
 
     def _act(self, name: str, client: viser.ClientHandle) -> None:
         actions: dict[str, Callable[[], object]] = {
@@ -145,7 +142,7 @@ class Page:
             "show": lambda: self._give_lesson(client),
             "run": self._run_or_pause,
         }
-        self._later(client, actions[name])
+        self._queue(client, actions[name])
 
     def _drag(self, phase: str, body: str, start: Array, end: Array) -> None:
         """Grab a ``body`` at ``start`` ``(3,)`` m, pull it to ``end`` ``(3,)`` m, or release it, as the mouse does."""
@@ -181,7 +178,7 @@ class Page:
         finally:
             self.leading.home()
         future = self._learner.submit(self.taught.lesson_of, *recording)
-        future.add_done_callback(lambda done: self._later(client, lambda: self._lesson_made(done)))
+        future.add_done_callback(lambda done: self._queue(client, lambda: self._lesson_made(done)))
 
     def _lesson_made(self, done: Future[HandLesson]) -> None:
         error = done.exception()
@@ -197,7 +194,7 @@ class Page:
             raise ValueError("there is no lesson to show yet; record one first")
         self.panel.buttons["show"].disabled = True
         future = self._learner.submit(self.taught.give, self.lesson.demonstration)
-        future.add_done_callback(lambda done: self._later(client, lambda: self._lesson_given(done)))
+        future.add_done_callback(lambda done: self._queue(client, lambda: self._lesson_given(done)))
 
     def _lesson_given(self, done: Future[None]) -> None:
         done.result()

@@ -13,7 +13,7 @@ import numpy as np
 import viser
 
 from sgimd_torch.spaces import Box
-from sgimd_torch.teach.chart import SKILL, Chart
+from sgimd_torch.teach.chart import COLOURS, Chart
 from sgimd_torch.teach.lessons import HandLesson
 from sgimd_torch.teach.taught import Status
 
@@ -28,18 +28,18 @@ ACTIONS: Final[dict[str, tuple[str, Any, Any]]] = {
     "run": (*RUN, "blue"),
 }
 """Label, icon and colour of each button."""
-LEAD: Final = (
+HOW_TO_LEAD: Final = (
     "Press **Record**, **drag the orange ball** (or any part of the arm), press **Stop**. "
     "The arm goes back to its start by itself."
 )
-LOOK: Final = "Nothing recorded yet."
-SEEN: Final = (
+NOTHING_RECORDED: Final = "Nothing recorded yet."
+INTRODUCTION: Final = (
     "The coloured map is the task space, {0}: light where an outcome came near, dark where none did yet. "
     "The orange ball is the hand of the robot. Small dots are goals of the benchmark."
 )
 _STATUS: Final = (
     '<div style="padding:0 .6em;line-height:1.5"><b style="font-size:1.1em">{0}</b><br>{1} of {2} movements<br>'
-    "{3} by hand<br>predicted error <b>{4}</b><br>{5} of {6} goals within reach</div>"
+    "{3} by hand<br>nearest outcome <b>{4}</b> from a goal<br>{5} of {6} goals within reach</div>"
     '<div style="padding:0 .6em;font-size:.85em;line-height:1.5"><b style="color:#f0781e">●</b> you &nbsp; '
     '<b style="color:#3c46be">●</b> latest outcomes<br><b style="color:#0a6e32">●</b> goals within '
     'reach &nbsp; <b style="color:#788ca0">●</b> goals still too far</div>'
@@ -71,12 +71,12 @@ class Panel:
         gui.set_panel_label("Teach it by hand")
         gui.main_panel.dock_right()
         gui.main_panel.set_width(350)
-        gui.add_markdown(SEEN.format(" and ".join(space.axis(k) for k in range(min(2, space.dim)))))
+        gui.add_markdown(INTRODUCTION.format(" and ".join(space.axis(k) for k in range(min(2, space.dim)))))
         with gui.add_folder("1 · Lead the arm"):
-            gui.add_markdown(LEAD)
+            gui.add_markdown(HOW_TO_LEAD)
             self._add_button("record")
         with gui.add_folder("2 · Look at what you recorded"):
-            self.lesson = gui.add_markdown(LOOK)
+            self.lesson = gui.add_markdown(NOTHING_RECORDED)
             self._add_button("discard")
         with gui.add_folder("3 · Teach it"):
             self._add_button("show")
@@ -85,7 +85,7 @@ class Panel:
         with panel.add_tab("The learner"):
             self.status = gui.add_html("")
             self._add_button("run")
-            gui.add_html(_LEGEND.format(",".join(f"rgb({r:.0f},{g:.0f},{b:.0f})" for r, g, b in SKILL)))
+            gui.add_html(_LEGEND.format(",".join(f"rgb({r:.0f},{g:.0f},{b:.0f})" for r, g, b in COLOURS)))
         panel.dock_left()
         panel.set_width(300)
         self.show_lesson(None)
@@ -107,7 +107,7 @@ class Panel:
         self.buttons["discard"].visible = lesson is not None or bool(problem)
         self.buttons["show"].disabled = lesson is None
         if lesson is None:
-            self.lesson.content = f"**This is no lesson:** {problem}" if problem else LOOK
+            self.lesson.content = f"**This is no lesson:** {problem}" if problem else NOTHING_RECORDED
             return
         place = ", ".join(f"{x:.2f}" for x in lesson.demonstration.outcome)
         words = f"Its outcome is **({place}) {self._space.unit}**, the orange ring."
@@ -117,21 +117,22 @@ class Panel:
         self.lesson.content = "\n".join([words, "", *(f"- {remark}" for remark in remarks)])
 
     def show_effect(self, before: Chart, after: Chart) -> None:
-        """Compare the skill before and after a lesson."""
-        more = int(after.met.sum() - before.met.sum())
+        """Compare the map before and after a lesson."""
+        more = int(after.reached.sum() - before.reached.sum())
+        distance = self._space.amount(after.mean_distance, ".3f")
         self.effect.content = (
-            f"**Taught.** Predicted error {before.mean_error:.3f} → **{self._space.amount(after.mean_error, '.3f')}**, "
+            f"**Taught.** From a goal to the nearest outcome: {before.mean_distance:.3f} → **{distance}**, "
             f"{more:+d} goals within reach."
         )
 
-    def show_status(self, now: Status, running: bool) -> None:
-        """Show what the learner does, and how well."""
+    def show_status(self, status: Status, running: bool) -> None:
+        """Show what the learner does, and what it has reached."""
         self.buttons["run"].label, self.buttons["run"].icon = PAUSE if running else RUN
-        doing = "replaying the record" if now.replaying else "learning by itself" if running else "paused"
-        if now.movements >= self._total:
-            doing = "all movements are made"
-        error, met = self._space.amount(now.chart.mean_error, ".3f"), now.chart.met
-        lessons = f"{now.lessons} lesson{'s' * (now.lessons != 1)}"
+        activity = "replaying the record" if status.replaying else "learning by itself" if running else "paused"
+        if status.movements >= self._total:
+            activity = "all movements are made"
+        distance, reached = self._space.amount(status.chart.mean_distance, ".3f"), status.chart.reached
+        lessons = f"{status.lessons} lesson{'s' * (status.lessons != 1)}"
         self.status.content = _STATUS.format(
-            doing, now.movements, self._total, lessons, error, int(met.sum()), len(met)
+            activity, status.movements, self._total, lessons, distance, int(reached.sum()), len(reached)
         )

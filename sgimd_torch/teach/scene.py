@@ -16,14 +16,17 @@ from viser.transforms import SO3
 
 from sgimd_torch.spaces import Array, Box, rounded
 from sgimd_torch.teach.arm import Arm
-from sgimd_torch.teach.chart import CELLS, SKILL, Chart, by_error
+from sgimd_torch.teach.chart import CELLS, COLOURS, Chart, picture_of
 from sgimd_torch.teach.led import HandLed
 
-HAND, LEARNER, MET, UNMET = (240, 120, 30), (60, 70, 190), (10, 110, 50), (120, 140, 160)
+HAND: Final = (240, 120, 30)  # colour of the robot's hand and of the lesson's outcome
+LEARNER: Final = (60, 70, 190)  # colour of the learner's latest outcomes
+REACHED: Final = (10, 110, 50)  # colour of goals within reach
+TOO_FAR: Final = (120, 140, 160)  # colour of goals out of reach, and of the axes
 ABOVE: Final = 0.002  # distance from one layer of the map to the next, as a share of the map's longer side
 NUMBERS: Final = 5  # largest number of steps between the numbers of an axis
 CAMERA: Final = np.array([0.32, -0.92, 0.66])  # from the middle of the scene, in sizes of the scene
-SEEN: Final = 1e-4  # share of the map's longer side; a robot that has moved less is not drawn again
+VISIBLE: Final = 1e-4  # share of the map's longer side; a robot that has moved less is not drawn again
 
 
 class Scene:
@@ -42,21 +45,24 @@ class Scene:
 
     def __init__(self, server: viser.ViserServer, led: HandLed, arm: Arm, outcomes: Box, goals: Array) -> None:
         self._scene, self._outcomes, self._led, self._model = server.scene, outcomes, led, led.model
-        low, high = outcomes.low, outcomes.high
-        origin = self._placed(low)
-        along, across = self._edges()
+        origin = self._placed(outcomes.low)
+        edges = self._placed(outcomes.low + np.diag(outcomes.sides)) - origin  # (outcome_dim, 3) m, of T in the world
+        along, across = edges[0], edges[min(1, outcomes.dim - 1)]
+        if outcomes.dim == 1 or not across.any():  # then the map is a strip
+            across = np.cross([0, -1, 0] if along[2] else [0, 0, 1], along) / 10
         self._up = np.cross(along, across) / np.linalg.norm(np.cross(along, across))
         self._up *= np.sign(self._up @ CAMERA)
         links = [arm.data.body(name).xpos for name in arm.links]
-        seen = np.stack([origin, origin + along, origin + across, origin + along + across, self._placed(high), *links])
-        self.size = float(np.ptp(seen, axis=0).max())
-        self._add_map(origin, along, across)
-        self._goals = self._points("/goals", self.ground(goals, 3), UNMET, 0.006)
-        self._landings = self._points("/landings", np.zeros((1, 3)), LEARNER, 0.01)
+        plane = [origin, origin + along, origin + across, origin + along + across]
+        corners = np.stack([*plane, self._placed(outcomes.high), *links])
+        self.size = float(np.ptp(corners, axis=0).max())
+        self._add_map(origin, along, across, edges)
+        self._goals = self._points("/goals", self.ground(goals, 3), TOO_FAR, 0.006)
+        self._latest = self._points("/latest", np.zeros((1, 3)), LEARNER, 0.01)
         names = [self._model.body(k).name for k in self._model.geom_bodyid]
-        shown = [k for k, name in enumerate(names) if name not in led.hidden and _is_seen(self._model, k)]
+        visible = [k for k, name in enumerate(names) if name not in led.hidden and _is_visible(self._model, k)]
         self._drawn = np.full((self._model.ngeom, 3), np.inf)
-        self._geoms = {k: self._add_geom(k) for k in shown}
+        self._geoms = {k: self._add_geom(k) for k in visible}
         self._hand = self._scene.add_icosphere("/hand", radius=0.026 * self.size, color=HAND, subdivisions=3)
         ring = trimesh.creation.torus(0.03 * self.size, 0.006 * self.size, 32, 8)
         self._mark = self._scene.add_mesh_simple("/mark", ring.vertices, ring.faces, color=HAND, visible=False)
@@ -66,8 +72,8 @@ class Scene:
         self._scene.configure_environment_map(None)
         self._scene.configure_default_lights(cast_shadow=False)
         self._scene.add_light_ambient("/light", intensity=0.6)
-        flat = float(np.ptp(seen[:, 2])) < 1e-6  # then it is seen from above
-        middle = (seen.min(axis=0) + seen.max(axis=0)) / 2
+        flat = float(np.ptp(corners[:, 2])) < 1e-6  # then the camera looks from above
+        middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
         away = np.array([0, -0.01, 1.05]) if flat else CAMERA * (1.3 if outcomes.dim > 2 else 1.0)
         server.initial_camera.position = tuple(middle + self.size * away)
         server.initial_camera.look_at = tuple(middle)
@@ -79,7 +85,7 @@ class Scene:
 
     def draw_arm(self, data: Any, hand: Array) -> None:
         """Draw the robot in the posture of ``data``, and its ``hand`` ``(3,)`` m."""
-        if np.allclose(data.geom_xpos, self._drawn, rtol=0, atol=SEEN * self.size):
+        if np.allclose(data.geom_xpos, self._drawn, rtol=0, atol=VISIBLE * self.size):
             return
         self._drawn = data.geom_xpos.copy()
         for k, handle in self._geoms.items():
@@ -88,15 +94,15 @@ class Scene:
         self._hand.position = hand
 
     def draw_map(self, chart: Chart) -> None:
-        """Draw the map of predicted errors on the ground, and the goals of the benchmark on the map."""
-        self.map.image = by_error(chart, self._outcomes)
-        self._goals.colors = np.where(chart.met[:, None], MET, UNMET).astype(np.uint8)
+        """Draw the map on the ground, and the goals of the benchmark on the map."""
+        self.map.image = picture_of(chart, self._outcomes)
+        self._goals.colors = np.where(chart.reached[:, None], REACHED, TOO_FAR).astype(np.uint8)
 
-    def draw_landings(self, outcomes: Array) -> None:
-        """Draw the latest ``outcomes`` ``(n, outcome_dim)``."""
-        self._landings.visible = len(outcomes) > 0
+    def draw_outcomes(self, outcomes: Array) -> None:
+        """Draw the learner's latest ``outcomes`` ``(n, outcome_dim)``."""
+        self._latest.visible = len(outcomes) > 0
         if len(outcomes):
-            self._landings.points = self.ground(outcomes, 5).astype(np.float16)
+            self._latest.points = self.ground(outcomes, 5).astype(np.float16)
 
     def mark(self, place: Array | None) -> None:
         """Draw the ring of a lesson at a ``place`` ``(outcome_dim,)`` of T; None hides it."""
@@ -117,44 +123,22 @@ class Scene:
     def _placed(self, points: Array) -> Array:
         """Positions ``(..., 3)`` m in the world of points ``(..., outcome_dim)`` of T."""
         rows = np.reshape(points, (-1, self._outcomes.dim))
-        if self._led.place is None:
-            placed = np.zeros((len(rows), 3))
-            placed[:, : min(2, self._outcomes.dim)] = rows[:, :2]
-        else:
-            placed = self._led.place(rows)
-        return placed.reshape(*np.shape(points)[:-1], 3)
+        return self._led.place(rows).reshape(*np.shape(points)[:-1], 3)
 
-    def _edge(self, k: int) -> Array:
-        """``(3,)`` m, the edge of T in dimension ``k`` in the world; zeros if the dimension has no direction there."""
-        if k >= self._outcomes.dim:
-            return np.zeros(3)
-        return self._placed(
-            self._outcomes.low + self._outcomes.sides * (np.arange(self._outcomes.dim) == k)
-        ) - self._placed(self._outcomes.low)
-
-    def _edges(self) -> tuple[Array, Array]:
-        """Edges of the map, ``(3,)`` m each. If T has one dimension, the map is a strip."""
-        along, across = self._edge(0), self._edge(1)
-        if not across.any():
-            across = np.cross([0, -1, 0] if along[2] else [0, 0, 1], along) / 10
-        return along, across
-
-    def _add_map(self, origin: Array, along: Array, across: Array) -> None:
-        """Add the map, with numbers and names at the edges of T that begin at ``origin``."""
+    def _add_map(self, origin: Array, along: Array, across: Array, edges: Array) -> None:
+        """Add the map, with numbers and names at the ``edges`` of T that begin at ``origin`` and have a direction."""
         width, height = float(np.linalg.norm(along)), float(np.linalg.norm(across))
         x, y = along / width, -across / height  # of the picture, whose first row is the upper one
         self.map = self._scene.add_image(
             "/map",
-            np.full((CELLS, CELLS, 3), SKILL[0], dtype=np.uint8),
+            np.full((CELLS, CELLS, 3), COLOURS[0], dtype=np.uint8),
             *(width, height),
             format="png",
             wxyz=SO3.from_matrix(np.stack([x, y, np.cross(x, y)], axis=1)).wxyz,
             position=origin + (along + across) / 2,
         )
-        for k, outwards in enumerate((y, -x, y - x)[: self._outcomes.dim]):
-            edge, low, high = self._edge(k), self._outcomes.low[k], self._outcomes.high[k]
-            if not edge.any():
-                continue
+        for k in np.flatnonzero(edges[:3].any(axis=1)).tolist():
+            edge, low, high, outwards = edges[k], self._outcomes.low[k], self._outcomes.high[k], (y, -x, y - x)[k]
             beside = origin + 0.04 * self.size * outwards
             step = rounded((high - low) / NUMBERS)
             for value in step * np.arange(np.ceil(low / step), np.floor(high / step) + 1):
@@ -162,14 +146,14 @@ class Scene:
                 self._label(f"/axes/{k}/{value:g}", f"{value + 0.0:g}", place)
             self._label(f"/axes/{k}/name", self._outcomes.axis(k), beside + edge / 2 + 0.06 * self.size * outwards)
             self._scene.add_line_segments(
-                f"/axes/{k}/line", np.stack([origin, origin + edge])[None], UNMET, thickness=0.003 * self.size
+                f"/axes/{k}/line", np.stack([origin, origin + edge])[None], TOO_FAR, thickness=0.003 * self.size
             )
 
     def _label(self, name: str, text: str, place: Array) -> None:
         self._scene.add_label(name, text, position=place, anchor="center-center", font_screen_scale=0.8)
 
 
-def _is_seen(model: Any, k: int) -> bool:
+def _is_visible(model: Any, k: int) -> bool:
     """Whether a viewer of MuJoCo shows geom ``k`` at first; floors are left out, as the map lies there."""
     floor = mujoco.mjtGeom(model.geom_type[k]) in (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
     return bool(not floor and model.geom_group[k] <= 2 and _rgba(model, k)[3] > 0)

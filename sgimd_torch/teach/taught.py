@@ -1,6 +1,6 @@
 """A run with lessons by hand: the learner moves by itself, gets lessons, and reports its status.
 
-    run = TaughtRun(config); run.go_on(20); run.show(demonstration); run.status().chart.mean_error; run.close()
+    run = TaughtRun(config); run.go_on(20); run.show(demonstration); run.status().chart.mean_distance; run.close()
 Only one thread at a time may use a `TaughtRun`. ``sgimd run --resume`` can continue the run.
 """
 
@@ -23,7 +23,7 @@ from sgimd_torch.teach.chart import Chart, chart_of
 from sgimd_torch.teach.led import hand_led_of
 from sgimd_torch.teach.lessons import HandLesson, lesson_by_hand
 
-LATEST: Final = 60  # number of landings that the page shows
+LATEST: Final = 60  # number of latest outcomes that the page draws
 IMITATIONS: Final = 10  # largest number of movements that imitate a lesson at once
 NO_MORE: Final = "the learner has made all its {0} movements; end this session, and go on with --movements {1}"
 ALONE: Final = (
@@ -40,14 +40,14 @@ class Status:
         movements: movements so far.
         lessons: lessons by hand so far.
         replaying: whether the recorded movements are still being replayed.
-        landed: ``(n, outcome_dim)`` latest outcomes.
-        chart: predicted errors of the learner.
+        outcomes: ``(n, outcome_dim)`` latest outcomes.
+        chart: map of the distances to the nearest outcomes.
     """
 
     movements: int
     lessons: int
     replaying: bool
-    landed: Array
+    outcomes: Array
     chart: Chart
 
 
@@ -75,10 +75,10 @@ class TaughtRun:
             raise ValueError(ALONE.format(config.algorithm))
         self._hand = ByHand(teacher=parts.teacher)
         self.parts = replace(parts, teacher=self._hand)
-        self._life = RunLoop(self.parts, resume=holds_run(config.directory / FILE))
-        self._episodes = self._life.episodes()
-        self._lessons = sum(each.kind == "shown" and each.who == BY_HAND for each in self._life.record.events())
-        self._landed: deque[Array] = deque(maxlen=LATEST)
+        self._loop = RunLoop(self.parts, resume=holds_run(config.directory / FILE))
+        self._episodes = self._loop.episodes()
+        self._lessons = sum(event.kind == "shown" and event.who == BY_HAND for event in self._loop.record.events())
+        self._outcomes: deque[Array] = deque(maxlen=LATEST)
 
     def go_on(self, movements: int, *, until_idle: bool = False) -> Status:
         """Let the learner make further movements, or replay recorded ones.
@@ -92,11 +92,11 @@ class TaughtRun:
         """
         for episode in islice(self._episodes, movements):
             if episode.outcome is not None:
-                self._landed.append(episode.outcome)
+                self._outcomes.append(episode.outcome)
             if until_idle and self.parts.learner.idle:
                 break
-        if not self._life.replaying:
-            self._life.commit()
+        if not self._loop.replaying:
+            self._loop.commit()
         return self.status()
 
     def give(self, demonstration: Demonstration) -> None:
@@ -106,9 +106,9 @@ class TaughtRun:
             ValueError: the learner cannot use this lesson, or not now; nothing has changed then.
         """
         total = self.config.movements
-        if self._life.replaying:
+        if self._loop.replaying:
             raise ValueError("the run still replays its record; a lesson must wait until that is done")
-        if self._life.movements >= total:
+        if self._loop.movements >= total:
             raise ValueError(NO_MORE.format(total, 2 * total))
         self.parts.environment.contexts.check("context of the lesson", demonstration.context)
         self.parts.learner.translate(demonstration)
@@ -131,10 +131,10 @@ class TaughtRun:
     def status(self) -> Status:
         """The present status."""
         robot, memory = self.parts.environment, self.parts.learner.memory
-        landed = np.array(self._landed).reshape(-1, robot.outcomes.dim)
+        outcomes = np.array(self._outcomes).reshape(-1, robot.outcomes.dim)
         chart = chart_of(robot, memory, self.parts.benchmark)
-        return Status(self._life.movements, self._lessons, self._life.replaying, landed, chart)
+        return Status(self._loop.movements, self._lessons, self._loop.replaying, outcomes, chart)
 
     def close(self) -> None:
         """Write the rest of the record, and release the directory for other processes."""
-        self._life.close()
+        self._loop.close()

@@ -46,8 +46,10 @@ def least_explored(
     Raises:
         ValueError: demonstrated outcomes and the memory have different dimensions.
     """
-    shown = [demonstration.outcome for demonstration in demonstrations]
-    demonstrated = check_vector("outcomes of the demonstrations", shown, memory.outcome_dim, "is it another robot's?")
+    outcomes = [demonstration.outcome for demonstration in demonstrations]
+    demonstrated = check_vector(
+        "outcomes of the demonstrations", outcomes, memory.outcome_dim, "is it another robot's?"
+    )
     low, high = demonstrated.min(axis=0), demonstrated.max(axis=0)
     side = np.maximum(high - low, 1e-9) / tiles  # above 0 even if all demonstrations lie on a line
 
@@ -179,7 +181,7 @@ def check_demonstrations(demonstrations: Sequence[Demonstration]) -> Sequence[De
     """
     if not demonstrations:
         raise ValueError("a teacher needs at least one demonstration; use no teacher to learn alone")
-    shapes = {(np.shape(shown.context), np.shape(shown.outcome)) for shown in demonstrations}
+    shapes = {(np.shape(demonstration.context), np.shape(demonstration.outcome)) for demonstration in demonstrations}
     if len(shapes) > 1 or any(len(shape) != 1 for pair in shapes for shape in pair):
         wanted = "contexts (context_dim,) and outcomes (outcome_dim,), all alike"
         raise ValueError(f"demonstrations must have {wanted}, got {sorted(shapes)}; are they of two robots?")

@@ -26,12 +26,12 @@ from sgimd_torch.environments.protocol import primitive_of
 from sgimd_torch.files import write_text
 from sgimd_torch.options.build import RunParts
 from sgimd_torch.options.signature import parsed
-from sgimd_torch.runs.load import load_parts
+from sgimd_torch.runs.load import OpenRun
 from sgimd_torch.runs.signals import parser_of
 from sgimd_torch.spaces import Array, Box, stream
 
 Answer = dict[str, Array]
-"""Vectors of an answer, by the names "goal", "context", "theta", "expected", "off" and "reached"."""
+"""Vectors of an answer, by the names "goal", "context", "theta", "expected", "expected_deviation" and "reached"."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -42,7 +42,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         OSError: a file cannot be read or written.
     """
     options = parser().parse_args(argv)
-    parts = load_parts(options.run, trust=options.trust)
+    run = OpenRun(options.run, trust=options.trust)
+    run.replay()
+    parts = run.parts
     box = parts.environment.outcomes
     goals = [*options.goal, *(_read(options.goals, box) if options.goals else [])]
     if not goals or (options.trajectory and len(goals) > 1):
@@ -54,7 +56,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         for answer in answers:
             print("; ".join(f"{name} {_text(value)}" for name, value in answer.items() if len(value)))
         return 0
-    heads = [name if name == "off" else f"{name}_{k}" for name, value in answers[0].items() for k in range(len(value))]
+    heads = [
+        name if name == "expected_deviation" else f"{name}_{k}"
+        for name, value in answers[0].items()
+        for k in range(len(value))
+    ]
     _write(options.out, heads, (np.concatenate([*answer.values()]) for answer in answers))
     print(f"{len(answers)} answers: {options.out}")
     return 0
@@ -84,8 +90,8 @@ def _answers(
     context = robot.contexts.check("--context", middle if given is None else given)
     if not len(parts.learner.memory):
         raise ValueError(f"{parts.config.directory} has an empty memory, so it infers no movement")
-    for k, each in enumerate(goals):
-        goal = robot.outcomes.check("goal", each, "it is a point of T, such as 0.3,0.2")
+    for k, point in enumerate(goals):
+        goal = robot.outcomes.check("goal", point, "it is a point of T, such as 0.3,0.2")
         estimate = inverse(context, goal)
         theta, expected = estimate.theta, estimate.expected
         answer = {"goal": goal, "context": context, "theta": theta}
@@ -94,7 +100,7 @@ def _answers(
         if expected is not None:
             answer["expected"] = expected
         if estimate.sd is not None:
-            answer["off"] = np.array([estimate.off])
+            answer["expected_deviation"] = np.array([estimate.expected_deviation])
         if execute:
             answer["reached"] = robot.execute(context, theta, stream(parts.config.seed, "ask", k))
         yield answer
@@ -103,16 +109,16 @@ def _answers(
 def _read(path: Path, box: Box) -> list[list[float]]:
     """The goals in a file; a first line of names is a header."""
     rows = [row for row in csv.reader(path.read_text(encoding="utf-8").splitlines()) if row]
-    found = list[list[float]]()
+    goals = list[list[float]]()
     for number, row in enumerate(rows):
         try:
-            found.append([parsed(cell, float) for cell in row])
+            goals.append([parsed(cell, float) for cell in row])
         except ValueError as error:
             if number or not all(cell.strip()[:1].isalpha() for cell in row):
                 raise ValueError(
                     f"{path}: row {number + 1} is no goal of {box.dim} numbers: {','.join(row)}"
                 ) from error
-    return found
+    return goals
 
 
 def _write_trajectory(path: Path, parts: RunParts, theta: Array) -> None:

@@ -38,7 +38,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         OSError: a file cannot be read or written.
     """
     options = _options(argv)
-    paths = [path for place in options.runs for found in find_runs(place).values() for path in found]
+    paths = [
+        path for place in options.runs for paths_of_variant in find_runs(place).values() for path in paths_of_variant
+    ]
     runs = [read_run(path) for path in dict.fromkeys(paths)]
     name, box = _reached_by(runs)
     outcomes = np.concatenate([run.outcomes[np.isfinite(run.outcomes).all(axis=1)] for run in runs])
@@ -71,12 +73,12 @@ def _reached_by(runs: Sequence[Run]) -> tuple[str, Box]:
     Raises:
         ValueError: the runs have different environments.
     """
-    found: dict[str, Run] = {}
+    run_of: dict[str, Run] = {}
     for run in runs:
         space = run.spaces["outcomes"]
-        found.setdefault(f"{run.robot}, {space.low.tolist()} to {space.high.tolist()}", run)
-    if len(found) > 1:
-        apart = ", ".join(f"{run.path} is of {words}" for words, run in found.items())
+        run_of.setdefault(f"{run.robot}, {space.low.tolist()} to {space.high.tolist()}", run)
+    if len(run_of) > 1:
+        apart = ", ".join(f"{run.path} is of {words}" for words, run in run_of.items())
         raise ValueError(f"all runs must be of one environment with one T: {apart}; make one file for each of them")
     return runs[0].robot, runs[0].spaces["outcomes"]
 

@@ -73,10 +73,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         remarks = check_environment(task.environment, movements=options.movements)
         _check_picture(task)
-        found = [f"{name} keeps every promise", *(f"  {each}" for each in remarks), *_goals(task), *_lessons(task)]
+        lines = [f"{name} keeps every promise", *(f"  {remark}" for remark in remarks), *_goals(task), *_lessons(task)]
     except SystemExit as end:  # exit(0) in the user's code would look like success
         raise ValueError(f"{name} calls exit({end}); raise an exception where a movement fails") from end
-    print("\n".join(found))
+    print("\n".join(lines))
     return 0
 
 
@@ -102,8 +102,8 @@ def _check_picture(task: Task) -> None:
 
 def _goals(task: Task) -> list[str]:
     goals, notes, _ = benchmark_of(task, None)
-    found = [f"goals of evaluation: {len(goals.goals)}", *notes, *_narrow(task.environment)]
-    return [f"  {line}" for line in found]
+    notes = [f"goals of evaluation: {len(goals.goals)}", *notes, *_narrow(task.environment)]
+    return [f"  {line}" for line in notes]
 
 
 def _narrow(robot: Environment) -> list[str]:
@@ -127,14 +127,14 @@ def _narrow(robot: Environment) -> list[str]:
 def _lessons(task: Task) -> list[str]:
     if task.demonstrations is None:
         return ["  demonstrations: none"]
-    shown, notes, _ = demonstrations_of(task, None)
-    places = np.array([each.outcome for each in shown])
-    tried = [check(task, each, row) for row, each in enumerate(shown[:TRIED])]
-    apart, spread = np.median([each.apart for each in tried]), np.linalg.norm(places.std(axis=0))
+    demonstrations, notes, _ = demonstrations_of(task, None)
+    places = np.array([demonstration.outcome for demonstration in demonstrations])
+    tried = [check(task, demonstration, row) for row, demonstration in enumerate(demonstrations[:TRIED])]
+    apart, spread = np.median([checked.apart for checked in tried]), np.linalg.norm(places.std(axis=0))
     if not apart < max(spread / 2, 3 * task.environment.outcome_noise):
         amount = task.environment.outcomes.amount(float(apart))
         notes = [
             *notes,
             f"when executed, they land {amount} from recorded outcomes (median); are joints, units and times right?",
         ]
-    return [f"  demonstrations: {len(shown)}", *(f"  {note}" for note in notes)]
+    return [f"  demonstrations: {len(demonstrations)}", *(f"  {note}" for note in notes)]

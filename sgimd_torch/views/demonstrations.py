@@ -33,19 +33,19 @@ from typing import Any, Final
 import numpy as np
 
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
-from sgimd_torch.demonstrations.columns import Columns, Recording
+from sgimd_torch.demonstrations.columns import ColumnNames, Recording
 from sgimd_torch.demonstrations.fit import beyond_limits, misfit_of
 from sgimd_torch.demonstrations.text import read_text
 from sgimd_torch.demonstrations.units import in_units, paced
-from sgimd_torch.environments.protocol import SimulationError, execute_many, primitive_of
+from sgimd_torch.environments.protocol import Replaying, SimulationError, execute_many, primitive_of
 from sgimd_torch.files import check_regular
 from sgimd_torch.options.build import task_of
 from sgimd_torch.options.command_line import parse
 from sgimd_torch.runs.signals import parsed_argument, parser_of, say
 from sgimd_torch.runs.tasks import Task
-from sgimd_torch.runs.tasks.taught import Replaying, theta_of
+from sgimd_torch.runs.tasks.taught import theta_of
 from sgimd_torch.spaces import Array, Box, Demonstration, stream
-from sgimd_torch.views.text_table import print_table
+from sgimd_torch.views.results import print_table
 
 HEADS: Final = ("recording", "lasts (s)", "samples", "says", "lands", "apart", "misfit", "remarks")
 
@@ -55,23 +55,23 @@ class Checked:
     """A recording, checked on a robot.
 
     Attributes:
-        shown: demonstration with the recording.
+        demonstration: the recording.
         lands: ``(outcome_dim,)`` outcome on the robot, None if the robot cannot use the recording.
         misfit: distance from the recording to the movement that the robot plays, NaN if unknown; see `misfit_of`.
         remarks: sentences, one for each limit of the robot that the recording exceeds.
-        refused: reason why the robot cannot use the recording, "" if it can.
+        fault: reason why the robot cannot use the recording, "" if it can.
     """
 
-    shown: Demonstration
+    demonstration: Demonstration
     lands: Array | None
     misfit: float
     remarks: list[str]
-    refused: str = ""
+    fault: str = ""
 
     @property
     def apart(self) -> float:
         """Distance from the recorded outcome to the outcome on the robot; NaN without an outcome on the robot."""
-        return float("nan") if self.lands is None else float(np.linalg.norm(self.lands - self.shown.outcome))
+        return float("nan") if self.lands is None else float(np.linalg.norm(self.lands - self.demonstration.outcome))
 
 
 def parser() -> argparse.ArgumentParser:
@@ -104,12 +104,12 @@ def parser() -> argparse.ArgumentParser:
     )
     source.add_argument("--speed", type=_above_zero, default=1.0, help="factor on the speed (default: %(default)s)")
     source.add_argument("--trim", action="store_true", help="cut off stillness before and after the movement")
-    shown: dict[str, Any] = {"description": __doc__, "formatter_class": argparse.RawDescriptionHelpFormatter}
+    described: dict[str, Any] = {"description": __doc__, "formatter_class": argparse.RawDescriptionHelpFormatter}
     parser = parser_of("demonstrations", __doc__)
     commands = parser.add_subparsers(dest="command", required=True, metavar="check|import")
-    checked = commands.add_parser("check", help="execute recordings on a robot", parents=[source], **shown)
+    checked = commands.add_parser("check", help="execute recordings on a robot", parents=[source], **described)
     imported = commands.add_parser(
-        "import", help="convert recordings to a file for --demonstrations", parents=[source], **shown
+        "import", help="convert recordings to a file for --demonstrations", parents=[source], **described
     )
     for command in (checked, imported):
         command.add_argument(
@@ -140,50 +140,52 @@ def main(argv: Sequence[str] | None = None) -> int:
         task = task_of(parse([f"--environment={options.environment}", *of_robot])[0])
     elif of_robot:
         raise ValueError(f"{of_robot[0]} is no option of sgimd demonstrations import, or needs --environment")
-    found = read(options, primitive_of(task.environment).ranges if task else None)
+    recordings = read_recordings(options, primitive_of(task.environment).ranges if task else None)
     if task is not None:
-        found = _on_robot(task, found, options.source)
-    unusable, usable = ([each for each in found if bool(each.refused) is wrong] for wrong in (True, False))
+        recordings = _on_robot(task, recordings, options.source)
+    unusable, usable = ([rec for rec in recordings if bool(rec.fault) is faulty] for faulty in (True, False))
     if unusable:
-        first = f"{unusable[0].name}: {unusable[0].refused}"
-        told = f"{len(unusable)} of {len(found)} recordings of {options.source} cannot be used; the first is {first}"
-        if len(found) == 1:
-            told = f"{options.source} cannot be used: {unusable[0].refused}"
+        first = f"{unusable[0].name}: {unusable[0].fault}"
+        told = (
+            f"{len(unusable)} of {len(recordings)} recordings of {options.source} cannot be used; the first is {first}"
+        )
+        if len(recordings) == 1:
+            told = f"{options.source} cannot be used: {unusable[0].fault}"
         if not usable or not importing or not options.skip_unusable:
             raise ValueError(told + "; --skip-unusable leaves such out" * bool(importing and usable))
-        say(*(f"left out {each.name}: {each.refused}" for each in unusable))
+        say(*(f"left out {recording.name}: {recording.fault}" for recording in unusable))
     if importing:
-        shown = [each.shown for each in usable if each.shown is not None]
-        save_demonstrations(options.out, shown)
-        print(f"{options.out}: {len(shown)} recordings, {shown[0].trajectory.shape[1]} joints")
+        demonstrations = [recording.demonstration for recording in usable if recording.demonstration is not None]
+        save_demonstrations(options.out, demonstrations)
+        print(f"{options.out}: {len(demonstrations)} recordings, {demonstrations[0].trajectory.shape[1]} joints")
     return 0
 
 
-def read(options: argparse.Namespace, ranges: Box | None) -> list[Recording]:
+def read_recordings(options: argparse.Namespace, ranges: Box | None) -> list[Recording]:
     """Read the recordings of a source of any format; ``ranges`` are those of the robot's joints, if they are known.
 
     Raises:
         ValueError: the source is damaged, or names or units of its columns are missing.
         OSError: the source cannot be read.
     """
-    source, units, doubt = options.source, options.unit, ""
+    source, units, unclear = options.source, options.unit, ""
     is_dataset = any((source / folder).is_dir() for folder in ("meta", "meta_data")) or source.suffix == ".parquet"
     if source.suffix == ".npz":
-        shown = load_demonstrations(source)
-        names = tuple(f"joint {k}" for k in range(shown[0].trajectory.shape[1]))
-        found = [Recording(str(row), each, names) for row, each in enumerate(shown)]
+        demonstrations = load_demonstrations(source)
+        names = tuple(f"joint {k}" for k in range(demonstrations[0].trajectory.shape[1]))
+        recordings = [Recording(str(row), demonstration, names) for row, demonstration in enumerate(demonstrations)]
         units = {"": "rad", **units}
     elif is_dataset:
         from sgimd_torch.demonstrations.lerobot import read_lerobot  # loads pyarrow, an optional dependency
 
-        found, doubt = read_lerobot(source, _columns(options, ranges, "timestamp", "episode_index"))
+        recordings, unclear = read_lerobot(source, _columns(options, ranges, "timestamp", "episode_index"))
     else:
-        found = read_text(source, _columns(options, ranges, "time", None))
-    found = in_units(found, units, ranges, doubt=doubt)
-    return [paced(each, options.speed, trim=options.trim) for each in found]
+        recordings = read_text(source, _columns(options, ranges, "time", None))
+    recordings = in_units(recordings, units, ranges, unclear=unclear)
+    return [paced(recording, options.speed, trim=options.trim) for recording in recordings]
 
 
-def _columns(options: argparse.Namespace, ranges: Box | None, time: str, recording: str | None) -> Columns:
+def _columns(options: argparse.Namespace, ranges: Box | None, time: str, recording: str | None) -> ColumnNames:
     """The columns that the options name; ``time`` and ``recording`` are defaults."""
     joints = options.joints or (ranges.names if ranges is not None else ())
     if not joints:
@@ -194,72 +196,74 @@ def _columns(options: argparse.Namespace, ranges: Box | None, time: str, recordi
             "--environment, which then executes the recordings"
         )
     times, divided = options.time or time, options.recording or recording
-    return Columns(joints, options.outcome, options.context, times, divided, options.rate, options.columns)
+    return ColumnNames(joints, options.outcome, options.context, times, divided, options.rate, options.columns)
 
 
-def check(task: Task, shown: Demonstration, row: int) -> Checked:
+def check(task: Task, demonstration: Demonstration, row: int) -> Checked:
     """Translate a recording and execute it on the robot of a task, with motor noise from the stream number ``row``.
 
     A recording without an outcome gets the outcome of its replay, or of its translation if the robot has no replay.
     """
     robot = task.environment
-    remarks = beyond_limits(robot, shown)
+    remarks = beyond_limits(robot, demonstration)
     try:
-        if shown.outcome.size and shown.outcome.shape != (robot.outcomes.dim,):
-            raise ValueError(f"its outcome has {shown.outcome.size} numbers, an outcome in T has {robot.outcomes.dim}")
-        context = robot.contexts.check("its context", shown.context)
-        theta = theta_of(task, shown)
+        if demonstration.outcome.size and demonstration.outcome.shape != (robot.outcomes.dim,):
+            raise ValueError(
+                f"its outcome has {demonstration.outcome.size} numbers, an outcome in T has {robot.outcomes.dim}"
+            )
+        context = robot.contexts.check("its context", demonstration.context)
+        theta = theta_of(task, demonstration)
         lands = execute_many(robot, context[None], theta[None], [stream(row, "demonstrations check")])[0]
-        if not shown.outcome.size:
+        if not demonstration.outcome.size:
             outcome = lands
             if isinstance(robot, Replaying) and not context.size:  # a replay has no context
-                outcome = robot.replay(shown.times, shown.trajectory)
-            shown = replace(shown, outcome=outcome)
-            remarks = beyond_limits(robot, shown)
+                outcome = robot.replay(demonstration.times, demonstration.trajectory)
+            demonstration = replace(demonstration, outcome=outcome)
+            remarks = beyond_limits(robot, demonstration)
     except (ValueError, SimulationError) as error:
-        return Checked(shown, None, float("nan"), remarks, str(error))
-    return Checked(shown, lands, misfit_of(robot, theta, shown), remarks)
+        return Checked(demonstration, None, float("nan"), remarks, str(error))
+    return Checked(demonstration, lands, misfit_of(robot, theta, demonstration), remarks)
 
 
-def _on_robot(task: Task, found: Sequence[Recording], source: Path) -> list[Recording]:
+def _on_robot(task: Task, recordings: Sequence[Recording], source: Path) -> list[Recording]:
     """The recordings after a check on the robot of the task; prints a line for each of them."""
     contexts = task.environment.contexts
-    if contexts.dim and any(each.shown is not None and not each.shown.context.size for each in found):
+    if contexts.dim and any(rec.demonstration and not rec.demonstration.context.size for rec in recordings):
         what = ", ".join(contexts.axis(k, "context") for k in range(contexts.dim))
         raise ValueError(f"{source} has no context ({what}); name its columns with --context")
     table: list[Sequence[str]] = [HEADS]
     after, apart, remarked = list[Recording](), list[float](), 0
-    for row, each in enumerate(found):
-        if each.shown is None:
-            table.append((each.name, *"------", f"cannot be used: {each.refused}"))
-            after.append(each)
+    for row, recording in enumerate(recordings):
+        if recording.demonstration is None:
+            table.append((recording.name, *"------", f"cannot be used: {recording.fault}"))
+            after.append(recording)
             continue
-        checked = check(task, each.shown, row)
-        table.append(_cells(each.name, checked))
-        after.append(each._replace(shown=checked.shown, refused=checked.refused))
+        checked = check(task, recording.demonstration, row)
+        table.append(_cells(recording.name, checked))
+        after.append(recording._replace(demonstration=checked.demonstration, fault=checked.fault))
         remarked += bool(checked.remarks)
         apart += [] if checked.lands is None else [checked.apart]
     print_table(table)
     if apart:
         print(
-            f"{len(apart)} of {len(found)} can be used; they land {np.median(apart):.3f} (median), "
+            f"{len(apart)} of {len(recordings)} can be used; they land {np.median(apart):.3f} (median), "
             f"{max(apart):.3f} (most) from where they say; {remarked} have remarks"
         )
     return after
 
 
-def _cells(name: str, found: Checked) -> tuple[str, ...]:
+def _cells(name: str, checked: Checked) -> tuple[str, ...]:
     """Cells of a recording in the table, one below each of ``HEADS``."""
-    times = found.shown.times
-    refused = [f"cannot be used: {found.refused}"] if found.refused else []
+    times = checked.demonstration.times
+    faults = [f"cannot be used: {checked.fault}"] if checked.fault else []
     return (
         name,
         f"{times[-1] - times[0]:.3g}",
         str(len(times)),
-        _point(found.shown.outcome),
-        *(("-", "-") if found.lands is None else (_point(found.lands), f"{found.apart:.3f}")),
-        "-" if np.isnan(found.misfit) else f"{found.misfit:.3f}",
-        "; ".join([*refused, *found.remarks]),
+        _point(checked.demonstration.outcome),
+        *(("-", "-") if checked.lands is None else (_point(checked.lands), f"{checked.apart:.3f}")),
+        "-" if np.isnan(checked.misfit) else f"{checked.misfit:.3f}",
+        "; ".join([*faults, *checked.remarks]),
     )
 
 
@@ -273,7 +277,7 @@ def _names(text: str) -> tuple[str, ...]:
 
 def _units(text: str) -> dict[str, str]:
     """Units by name of the joint; the name of a unit alone is ""."""
-    parts = [each.rpartition("=") for each in _names(text)]
+    parts = [part.rpartition("=") for part in _names(text)]
     return {joint.strip(): unit.strip() for joint, _, unit in parts}
 
 

@@ -1,22 +1,34 @@
-"""The table of results, one row for each variant: with the same columns, units and statistics wherever it is shown.
+"""The table of results, one row for each variant, and tables on stdout as text, as csv, or for LaTeX.
 
-for column in results(variants): column.head, column.texts()    # of sgimd table and of sgimd report
+    for column in results(variants): column.head, column.texts()    # of sgimd table and of sgimd report
+    print_table([("variant", "error (m)"), ("sgim-d", "0.123"), ("random", "0.456")])    # the first row is the head
+
 Over seeds, every number is an interquartile mean: one bad seed does not move it. Over the goals of an evaluation there
 are both the mean, eq. (10), and the median: a few goals that are missed by far move only the mean.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+import csv
+import io
+import re
+from collections.abc import Iterable, Sequence
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from sgimd_torch.evaluation import RECENT
+from sgimd_torch.runs.signals import printable
 from sgimd_torch.views.statistics import Interval, over_seeds, point, show
 from sgimd_torch.views.variants import EARLY, Variant, unit_of
 
-MISSING = "-"  # text of a number that is not known
+MISSING: Final = "-"  # text of a number that is not known
+LATEX: Final = {  # signs that have a meaning in LaTeX
+    **{sign: f"\\{sign}" for sign in "&%$#_{}"},
+    "\\": r"\textbackslash{}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+}
 
 
 class Column(NamedTuple):
@@ -48,24 +60,55 @@ def results(variants: Sequence[Variant]) -> list[Column]:
     if any(variant.last for variant in variants):
         expected = at_last("expected_error")
         early = [variant.at(EARLY) if variant.last > EARLY else None for variant in variants]
-        found = [
+        columns = [
             Column("seeds", [point(len(variant.used)) for variant in variants], ".0f"),
             Column("movements", [point(variant.last) if variant.last else None for variant in variants], ".0f"),
             *([Column(unit(f"error at {EARLY}"), early)] if any(early) else []),
             Column(unit("error"), at_last("mean_error")),
             *([Column(unit("expected error"), expected)] if any(expected) else []),
             Column(unit("median"), at_last("median_error")),
-            Column(unit("noise floor"), [each and point(each.value) for each in at_last("noise_floor")]),
+            Column(unit("noise floor"), [floor and point(floor.value) for floor in at_last("noise_floor")]),
         ]
     else:
         own = [variant.own for variant in variants]
-        found = [
+        columns = [
             Column("seeds", [point(len(variant.runs)) for variant in variants], ".0f"),
-            Column("movements", [point(int(each.movements[-1])) for each in own], ".0f"),
+            Column("movements", [point(int(curve.movements[-1])) for curve in own], ".0f"),
             Column("failed", [over_seeds(variant.failed) for variant in variants], ".1%"),
-            Column(unit(f"miss of the last {RECENT} own goals"), [each.last_missed for each in own]),
-            Column("met", [each.last_met for each in own], ".0%"),
+            Column(unit(f"miss of the last {RECENT} own goals"), [curve.last_missed for curve in own]),
+            Column("met", [curve.last_met for curve in own], ".0%"),
         ]
     for head, part in (("physics", "physics"), ("learning", "learner")):
-        found.append(Column(f"{head} (ms)", [point(1e3 * variant.seconds(part)) for variant in variants], ".2f"))
-    return found
+        columns.append(Column(f"{head} (ms)", [point(1e3 * variant.seconds(part)) for variant in variants], ".2f"))
+    return columns
+
+
+def print_table(rows: Sequence[Sequence[str]]) -> None:
+    """Print rows of equal length in aligned columns, two spaces apart.
+
+    Each row is flushed, so that a reader such as ``head``, which closes the pipe, causes its error here.
+    """
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        line = "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))
+        print(printable(line.rstrip()), flush=True)
+
+
+def print_csv(rows: Iterable[Sequence[str]]) -> None:
+    """Print rows with commas between their cells."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows([printable(cell) for cell in row] for row in rows)
+    print(text.getvalue(), end="", flush=True)
+
+
+def print_latex(rows: Sequence[Sequence[str]]) -> None:
+    """Print rows as a ``tabular`` of LaTeX, which needs no package; numbers are aligned to the right."""
+    head, *lines = [" & ".join(map(_in_latex, row)) + r" \\" for row in rows]
+    print(rf"\begin{{tabular}}{{l{'r' * (len(rows[0]) - 1)}}}", r"\hline", head, r"\hline", *lines, sep="\n")
+    print(r"\hline", r"\end{tabular}", sep="\n", flush=True)
+
+
+def _in_latex(cell: str) -> str:
+    """The text of a cell in LaTeX; a minus before a digit is set as one."""
+    text = "".join(LATEX.get(sign, sign) for sign in printable(cell).replace("\n", " "))
+    return re.sub(r"(?<![\w.])-(?=\d)", "$-$", text)

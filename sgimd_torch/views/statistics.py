@@ -1,21 +1,20 @@
-"""Statistics over seeds: interquartile means, bootstrap intervals, probability of improvement, Holm's method.
+"""Statistics over seeds: interquartile means and bootstrap intervals.
 
 Agarwal et al. (2021), "Deep reinforcement learning at the edge of the statistical precipice": with few seeds, every
 number needs an interval. ``errors`` are mean benchmark errors (m), one for each seed; smaller is better.
-    found = iqm_interval(errors, rng=rng()); show(found)
+    number = iqm_interval(errors, rng=rng()); show(number)
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Mapping
-from typing import Final, NamedTuple, TypeVar
+from collections.abc import Callable, Mapping
+from typing import Final, NamedTuple
 
 import numpy as np
-from scipy import optimize, stats
+from scipy import stats
 
 from sgimd_torch.spaces import Array
 
-Key = TypeVar("Key", bound=Hashable)
 LEVEL = 0.95
 RESAMPLES = 9999
 LEAST_SEEDS: Final = 5  # smallest number of seeds for an interval and a verdict
@@ -35,15 +34,10 @@ def rng() -> np.random.Generator:
     return np.random.default_rng(SEED)
 
 
-def show(found: Interval, form: str = ".2f", unit: str = "") -> str:
+def show(number: Interval, form: str = ".2f", unit: str = "") -> str:
     """A text such as ``0.48 [0.45, 0.52] m``; without an interval, no brackets. Minus signs are ASCII, for programs."""
-    between = "" if np.isnan(found.low) else f" [{found.low:{form}}, {found.high:{form}}]"
-    return f"{found.value:{form}}{between}{f' {unit}' if unit else ''}"
-
-
-def metres(found: Interval, form: str = "+.4f") -> str:
-    """A text for a difference in metres with its sign: ``−0.0103 [−0.0162, −0.0074] m``."""
-    return show(found, form, "m").replace("-", "−")
+    between = "" if np.isnan(number.low) else f" [{number.low:{form}}, {number.high:{form}}]"
+    return f"{number.value:{form}}{between}{f' {unit}' if unit else ''}"
 
 
 def interquartile_mean(values: Array) -> Array:
@@ -73,7 +67,7 @@ def interval(
         samples: arrays ``(n_seeds, *rest)``.
         rng: stream of the bootstrap.
         paired: whether all samples have the same seeds in the same order, so that seeds are drawn jointly.
-        level: confidence level; see `holm`.
+        level: confidence level.
 
     Raises:
         ValueError: a sample has fewer than 2 seeds or is not finite, or paired samples differ in length.
@@ -94,7 +88,7 @@ def interval(
         return statistic(*(sample[row] for sample, row in zip(samples, rows, strict=True)))
 
     rows = [np.arange(len(sample)) for sample in samples]
-    found = stats.bootstrap(
+    bootstrapped = stats.bootstrap(
         rows,
         of_rows,
         n_resamples=RESAMPLES,
@@ -104,7 +98,7 @@ def interval(
         method="percentile",
         rng=rng,
     )
-    return Interval(float(statistic(*samples)), *map(float, found.confidence_interval))
+    return Interval(float(statistic(*samples)), *map(float, bootstrapped.confidence_interval))
 
 
 def iqm_interval(*strata: Array, rng: np.random.Generator, level: float = LEVEL) -> Interval:
@@ -126,69 +120,6 @@ def over_seeds(values: Array) -> Interval | None:
     if not len(values) or not np.isfinite(values).all():
         return None
     return point(float(values[0])) if len(values) == 1 else iqm_interval(values, rng=rng())
-
-
-def improvement(ours: Array, theirs: Array) -> Array:
-    """Probability of improvement: share of the pairs (one of our errors, one of theirs) in which ours is smaller.
-
-    The errors are ``(..., n)`` and ``(..., m)``; a tie counts half. The share is the Mann-Whitney statistic divided by
-    n m; see Agarwal et al. (2021).
-    """
-    x, y = np.asarray(ours)[..., :, None], np.asarray(theirs)[..., None, :]
-    shares: Array = np.mean((x < y) + 0.5 * (x == y), axis=(-2, -1))
-    return shares
-
-
-def improvement_interval(ours: Array, theirs: Array, *, level: float = LEVEL) -> Interval:
-    """``improvement`` of ours ``(n,)`` over theirs ``(m,)``, with a score interval, which stays wide for few seeds.
-
-    Wilson's interval for this statistic has all probabilities that the data do not reject (Newcombe 2006, Statistics in
-    Medicine 25:559, method 5). If all our errors are smaller than all of theirs, the interval is [.80, 1] with 10 seeds
-    and [.90, 1] with 20; a bootstrap would give [1, 1] even with 2 seeds. If errors are normal, the interval has the
-    true value in 95 to 98 % of cases with 5, 10 or 20 seeds. With fewer than ``LEAST_SEEDS``, the result is a `point`.
-
-    Raises:
-        ValueError: a side has fewer than 2 seeds, or an error is not finite.
-    """
-    for sample in (ours, theirs):
-        if len(sample) < 2 or not np.isfinite(sample).all():
-            raise ValueError(f"an interval needs 2 or more seeds with finite errors, got {np.asarray(sample).tolist()}")
-    n, m, found = len(ours), len(theirs), float(improvement(ours, theirs))
-    if min(n, m) < LEAST_SEEDS:
-        return point(found)
-    z = float(stats.norm.isf((1 - level) / 2))
-
-    def excess(p: float) -> float:
-        """Squared distance from p to the statistic, minus z^2 times the variance under p; above 0, p is rejected."""
-        variance = p * (1 - p) * (1 + ((n + m) / 2 - 1) * ((1 - p) / (2 - p) + p / (1 + p))) / (n * m)
-        return (found - p) ** 2 - z * z * variance
-
-    inside = float(np.clip(found, 1e-9, 1 - 1e-9))
-    low = optimize.brentq(excess, 0.0, inside) if found > 0 else 0.0
-    high = optimize.brentq(excess, inside, 1.0) if found < 1 else 1.0
-    return Interval(found, low, high)
-
-
-def holm(claims: Iterable[Key], rejects: Callable[[Key, float], bool]) -> set[Key]:
-    """The claims that are accepted jointly: the probability that any accepted claim is wrong is at most 5 %.
-
-    Holm's method (1979) with intervals: all claims are tested at Bonferroni's level for their number. Accepted claims
-    are set aside, and the remaining claims are tested again at the level for their own number.
-
-    Args:
-        claims: all claims that were considered, also those without a chance.
-        rejects: function of a claim and a confidence level; true if the interval at this level decides the claim.
-    """
-    left = list(dict.fromkeys(claims))
-    standing: set[Key] = set()
-    while left:
-        level = 1 - (1 - LEVEL) / len(left)
-        decided = {claim for claim in left if rejects(claim, level)}
-        if not decided:
-            break
-        standing |= decided
-        left = [claim for claim in left if claim not in decided]
-    return standing
 
 
 def common_differences(ours: Mapping[int, float], theirs: Mapping[int, float]) -> Array:

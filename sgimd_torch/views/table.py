@@ -27,14 +27,13 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from sgimd_torch.options.config import MAY_CHANGE
 from sgimd_torch.record import RunError
+from sgimd_torch.runs.directory import MAY_CHANGE
 from sgimd_torch.runs.read import Run
 from sgimd_torch.runs.signals import parser_of, say
-from sgimd_torch.views.results import Column, results
+from sgimd_torch.views.results import Column, print_csv, print_latex, print_table, results
 from sgimd_torch.views.statistics import LEAST_SEEDS
-from sgimd_torch.views.text_table import print_csv, print_latex, print_table
-from sgimd_torch.views.variants import Variant, baseline_of, best_first, compare, differing, read, unit_of
+from sgimd_torch.views.variants import Variant, baseline_of, best_first, compare, differing, read_runs, unit_of
 
 
 def parser() -> argparse.ArgumentParser:
@@ -56,11 +55,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         ValueError: there is nothing to show, or a run is damaged.
     """
     options = parser().parse_args(argv)
-    found = read(options.runs)
-    runs = [run for each in found.values() for run in each]
+    variant_runs = read_runs(options.runs)
+    runs = [run for seeds in variant_runs.values() for run in seeds]
     evaluated = options.at or options.baseline or any(len(run.evaluation["movements"]) for run in runs)
     at = options.at or (_last_common([run for run in runs if run.summary["finished"]]) if evaluated else None)
-    every = best_first(Variant(name, each, at) for name, each in found.items())
+    every = best_first(Variant(name, seeds, at) for name, seeds in variant_runs.items())
     variants = [variant for variant in every if variant.used or not evaluated][::-1]
     left_out = [
         f"{run.path} was not evaluated after {at} movements, it has {len(run.index)} of {run.config['movements']}"
@@ -73,7 +72,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     columns = results(variants)
     if options.baseline is not None:
         baseline = baseline_of(variants, options.baseline)
-        minus = {each.variant: each.found for each in compare(variants, baseline)}
+        minus = {comparison.variant: comparison.difference for comparison in compare(variants, baseline)}
         head = unit_of(variants)(f"minus {options.baseline}")
         columns.append(Column(head, [minus.get(variant) for variant in variants], "+.4f"))
     names = [variant.name for variant in variants]
@@ -81,7 +80,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         parts = [part for column in columns for part in column.parts()]
         print_csv(zip(["variant", *names], *parts, strict=True))
     else:
-        rows = list(zip(["variant", *names], *([each.head, *each.texts()] for each in columns), strict=True))
+        rows = list(zip(["variant", *names], *([column.head, *column.texts()] for column in columns), strict=True))
         (print_latex if options.format == "latex" else print_table)(rows)
     if few := [f"{variant.name} ({len(variant.used or variant.runs)})" for variant in variants if variant.few]:
         say(f"fewer than {LEAST_SEEDS} seeds, too few for an interval: {', '.join(few)}")
@@ -98,7 +97,7 @@ def _last_common(runs: Sequence[Run]) -> int:
     Raises:
         RunError: no evaluation is common to all runs.
     """
-    moments = [set(run.answers["own"]["movements"].tolist()) for run in runs]
+    moments = [set(run.evaluations["own"]["movements"].tolist()) for run in runs]
     common = set.intersection(*moments) if moments else {0}
     if not common:
         if not any(moments):

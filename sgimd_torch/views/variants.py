@@ -1,6 +1,6 @@
 """Variants of a study: their statistics over seeds, and their comparison, for tables and reports.
 
-variants = best_first(Variant(name, runs) for name, runs in read(Path("study")).items())
+variants = best_first(Variant(name, runs) for name, runs in read_runs(Path("study")).items())
 chosen = baseline_of(variants, "random"); [(row.variant.label, row.verdict) for row in compare(variants, chosen)]
 """
 
@@ -18,11 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from sgimd_torch.evaluation import RECENT
+from sgimd_torch.evaluation import RECENT, OwnGoals
 from sgimd_torch.figures.names import label
 from sgimd_torch.options.catalogue import unknown
-from sgimd_torch.options.config import PLACE
-from sgimd_torch.runs.directory import FILE
+from sgimd_torch.runs.directory import FILE, PLACE
 from sgimd_torch.runs.read import Run, find_runs, read_run
 from sgimd_torch.runs.signals import say
 from sgimd_torch.spaces import Array
@@ -33,18 +32,18 @@ POINTS: Final = 40  # largest number of points of a curve of own goals
 USUAL: Final = "sgim-d"  # name of the default baseline
 
 
-def read(place: Path) -> dict[str, list[Run]]:
+def read_runs(place: Path) -> dict[str, list[Run]]:
     """All runs below a folder, by name of the variant, without their thetas; folders without a run are named.
 
     Raises:
         RunError: there are no runs, or one is damaged.
     """
     runs: dict[str, list[Run]] = {}
-    found = [(name, path) for name, paths in find_runs(place).items() for path in paths]
+    places = [(name, path) for name, paths in find_runs(place).items() for path in paths]
     for folder in sorted([*place.glob("seed-*/"), *place.glob("*/seed-*/")]):
         if not os.path.isfile(folder / FILE):
             say(f"left out: {folder} has no {FILE} that can be read")
-    for name, path in tqdm(found, "reading", unit="", delay=1.0, disable=None):
+    for name, path in tqdm(places, "reading", unit="", delay=1.0, disable=None):
         run = replace(read_run(path), thetas=np.empty((0, 0)))  # thetas need much memory, and no view shows them
         runs.setdefault(name, []).append(run)
     return runs
@@ -64,15 +63,15 @@ def unit_of(variants: Sequence[Variant]) -> Callable[[str], str]:
 
 def differing(variants: Sequence[Variant]) -> dict[str, list[str]]:
     """Settings in which runs differ, except the seed and the folders, with the values of each variant as text."""
-    found = {}
+    values_of = {}
     for name in dict.fromkeys(name for variant in variants for run in variant.runs for name in run.config):
-        values = [dict.fromkeys(shown(run.config.get(name)) for run in variant.runs) for variant in variants]
+        values = [dict.fromkeys(text_of(run.config.get(name)) for run in variant.runs) for variant in variants]
         if name not in PLACE and len(set().union(*values)) > 1:
-            found[name] = [" or ".join(each) for each in values]
-    return found
+            values_of[name] = [" or ".join(texts) for texts in values]
+    return values_of
 
 
-def shown(value: Any) -> str:
+def text_of(value: Any) -> str:
     """A value of a setting or version as text, a dash for None."""
     return "–" if value is None else value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
 
@@ -94,12 +93,12 @@ class Variant:
         self.runs = sorted(runs, key=lambda run: int(run.config["seed"]))
         self.algorithm = str(self.runs[0].config["algorithm"])
         self.environment, self.space = str(self.runs[0].config["environment"]), self.runs[0].spaces["outcomes"]
-        evaluated = [run for run in self.runs if len(run.answers["own"]["movements"])]
+        evaluated = [run for run in self.runs if len(run.evaluations["own"]["movements"])]
         if at is None:
             self.used = [run for run in evaluated if run.summary["finished"]] or evaluated
         else:
-            self.used = [run for run in evaluated if at in run.answers["own"]["movements"]]
-        moments = [run.answers["own"]["movements"] for run in self.used]
+            self.used = [run for run in evaluated if at in run.evaluations["own"]["movements"]]
+        moments = [run.evaluations["own"]["movements"] for run in self.used]
         self.evaluated: NDArray[np.int64] = reduce(np.intersect1d, moments or [np.empty(0)]).astype(np.int64)
         self.last = at or (int(self.evaluated[-1]) if len(self.evaluated) else 0)  # number of movements
 
@@ -129,8 +128,8 @@ class Variant:
     @cached_property
     def curve(self) -> Array:
         """``(3, n)`` m: interquartile mean over seeds at each of ``evaluated``, and both ends of its interval."""
-        found = [over_seeds(column) or (np.nan,) * 3 for column in self.errors.T]
-        return np.array(found, dtype=np.float64).reshape(-1, 3).T
+        numbers = [over_seeds(column) or (np.nan,) * 3 for column in self.errors.T]
+        return np.array(numbers, dtype=np.float64).reshape(-1, 3).T
 
     @cached_property
     def last_error(self) -> Interval | None:
@@ -143,20 +142,11 @@ class Variant:
         length = min(len(run.index) for run in self.runs)
         movements = np.unique(np.linspace(0, length, POINTS + 1).astype(np.int64))
         goals = [run.own_goals() for run in self.runs]
-        missed = [[each.recent(until) for until in movements.tolist()] for each in goals]
-        failed = [
-            [
-                float(run.failed[max(0, until - RECENT) : until].mean()) if until else np.nan
-                for until in movements.tolist()
-            ]
-            for run in self.runs
+        curves = [
+            [_own_after(run, own, until) for until in movements.tolist()]
+            for run, own in zip(self.runs, goals, strict=True)
         ]
-        met = [
-            [float((near <= run.tolerance).mean()) if len(near) else np.nan for near in row]
-            for run, row in zip(self.runs, missed, strict=True)
-        ]
-        medians = [[float(np.median(near)) if len(near) else np.nan for near in row] for row in missed]
-        return OwnCurve(movements, np.array(medians), np.array(met), np.array(failed))
+        return OwnCurve(movements, *np.array(curves, dtype=np.float64).transpose(2, 0, 1))
 
     @property
     def failed(self) -> Array:
@@ -172,8 +162,8 @@ class Variant:
     @cached_property
     def demonstrated(self) -> Array:
         """``(n, outcome_dim)`` m, outcomes of the demonstrations shown in all runs."""
-        shown = [each.outcome for run in self.runs for each in run.demonstrations]
-        return np.array(shown, dtype=np.float64).reshape(len(shown), self.landed.shape[1])
+        outcomes = [demonstration.outcome for run in self.runs for demonstration in run.demonstrations]
+        return np.array(outcomes, dtype=np.float64).reshape(len(outcomes), self.landed.shape[1])
 
     @cached_property
     def misses(self) -> tuple[Array, Array, Array]:
@@ -181,8 +171,8 @@ class Variant:
         expected, NaN if they did not say; all are means over seeds."""
         goals = self.typical.benchmark
         both = [run.missed_by(self.last) for run in self.used if np.array_equal(run.benchmark, goals)]
-        found, expected = np.mean(both, axis=0)
-        return goals, found, expected
+        errors, expected = np.mean(both, axis=0)
+        return goals, errors, expected
 
     @property
     def expects(self) -> bool:
@@ -243,19 +233,30 @@ class Comparison:
     Args:
         variant: variant that is compared with the baseline.
         seeds: ``(n_seeds,)`` m, differences at the common seeds.
-        found: interquartile mean (m) of the differences, with its interval.
+        difference: interquartile mean (m) of the differences, with its interval.
     """
 
     variant: Variant
     seeds: Array
-    found: Interval
+    difference: Interval
 
     @property
     def verdict(self) -> str:
         """Verdict by the position of the interval relative to 0, or a text that there are too few seeds."""
         if len(self.seeds) < LEAST_SEEDS:
             return f"fewer than {LEAST_SEEDS} common seeds"
-        return "better" if self.found.high < 0 else "worse" if self.found.low > 0 else "not told apart"
+        return "better" if self.difference.high < 0 else "worse" if self.difference.low > 0 else "not told apart"
+
+
+def _own_after(run: Run, goals: OwnGoals, until: int) -> tuple[float, float, float]:
+    """Median distance missed, share met and share failed of the last 50 before movement ``until``; NaN for none."""
+    missed, failed = goals.recent(until), run.failed[max(0, until - RECENT) : until]
+    median = float(np.median(missed)) if len(missed) else np.nan
+    return median, _share(missed <= run.tolerance), _share(failed)
+
+
+def _share(values: NDArray[np.bool_]) -> float:
+    return float(values.mean()) if len(values) else np.nan
 
 
 def baseline_of(variants: Sequence[Variant], name: str | None = None) -> Variant | None:
@@ -279,7 +280,9 @@ def compare(variants: Sequence[Variant], baseline: Variant | None) -> list[Compa
     theirs = _last_errors(baseline)
     others = [variant for variant in variants if variant is not baseline and variant.last == baseline.last]
     differences = [(variant, common_differences(_last_errors(variant), theirs)) for variant in others]
-    return [Comparison(variant, seeds, found) for variant, seeds in differences if (found := over_seeds(seeds))]
+    return [
+        Comparison(variant, seeds, difference) for variant, seeds in differences if (difference := over_seeds(seeds))
+    ]
 
 
 def _last_errors(variant: Variant) -> dict[int, float]:

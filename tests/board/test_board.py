@@ -1,6 +1,5 @@
 """The board: what its curves count, what its file holds, and that a resumed run leaves one continuous board."""
 
-import signal
 from pathlib import Path
 
 import numpy as np
@@ -16,12 +15,12 @@ from tensorboardX import summary
 
 from boards import board_of, curves_of, pictures_of
 from own import MODULE
-from runs import arguments, content_of, end, stopped_at
+from runs import content_of
 from sgimd_torch import InterestMap, stream
 from sgimd_torch.board import pictures
 from sgimd_torch.board.curves import Behaviour, branches, of_evaluation, of_regions
-from sgimd_torch.board.events import EventFile
 from sgimd_torch.board.legend import LEGEND
+from sgimd_torch.board.listener import EventFile
 from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.figures.sections import sections
 from sgimd_torch.options.command_line import main
@@ -91,14 +90,14 @@ def test_imitations_count_for_the_teacher_and_not_as_goals_of_the_learners_own()
     assert values["teacher/missed_by"] == pytest.approx(0.3 * np.sqrt(0.5))
 
 
-def test_shares_of_regimes_sum_to_one_and_a_regime_that_was_seen_keeps_its_curve():
+def test_shares_of_kinds_of_movements_sum_to_one_and_a_kind_that_was_seen_keeps_its_curve():
     behaviour = Behaviour(0.02)
     for index, origin in enumerate(["global", "local", "local", "imitate"]):
         behaviour.episode(movement(index, GOAL, FAR, origin))
-    assert behaviour.curves().items() >= {"regime/global": 0.25, "regime/local": 0.5, "regime/imitate": 0.25}.items()
+    assert behaviour.curves().items() >= {"kind/global": 0.25, "kind/local": 0.5, "kind/imitate": 0.25}.items()
     behaviour.episode(Episode(4, np.zeros(0), None, None, None))
-    values = {tag: value for tag, value in behaviour.curves().items() if tag.startswith("regime/")}
-    assert values == {"regime/global": 0, "regime/local": 0, "regime/imitate": 0, "regime/rest": 1}
+    values = {tag: value for tag, value in behaviour.curves().items() if tag.startswith("kind/")}
+    assert values == {"kind/global": 0, "kind/local": 0, "kind/imitate": 0, "kind/rest": 1}
 
 
 def test_requests_are_counted_by_strategy():
@@ -189,9 +188,11 @@ def test_the_curves_of_a_run_are_those_of_its_record(watched):
         expected = dict(zip(read.evaluation["movements"], read.evaluation[column], strict=True))
         expected = {step: value for step, value in expected.items() if np.isfinite(value)}  # the floor: at the end only
         assert curves[f"error/{tag}"] == pytest.approx(expected, rel=1e-6)
+    shares = read.evaluation["goals_met"] / len(read.benchmark)
+    assert curves["goals/met"] == pytest.approx(dict(zip(read.evaluation["movements"], shares, strict=True)))
     first = read.origin[:50]
     for origin in np.unique(first):
-        assert curves[f"regime/{origin}"][50] == pytest.approx((first == origin).mean())
+        assert curves[f"kind/{origin}"][50] == pytest.approx((first == origin).mean())
     shown = {step: (read.demonstration[:step] >= 0).sum() for step in (50, 100, 150)}
     assert curves["teacher/demonstrations"] == shown
     assert curves["competence/R"].keys() == curves["time/physics"].keys() == {50, 100, 150}
@@ -250,13 +251,6 @@ def assert_same_board(directory, whole):
     assert found == wanted
 
 
-def test_a_run_that_was_killed_and_resumed_has_the_board_of_one_that_never_was(tmp_path, go, benchmark, watched):
-    directory = tmp_path / "sgim-d" / "seed-003"
-    end(stopped_at(130, *arguments(tmp_path, benchmark), *OPTIONS), signal.SIGKILL)
-    assert go(tmp_path, *OPTIONS, "--resume") == 0
-    assert_same_board(directory, watched)
-
-
 def test_a_board_depends_only_on_the_last_request(tmp_path, go, watched):
     assert go(tmp_path, *OPTIONS, "--movements", 130, "--board", "false", "--evaluate_at", "60") == 0
     assert go(tmp_path, *OPTIONS, "--resume") == 0
@@ -296,35 +290,3 @@ def test_an_outcome_that_is_named_like_a_formula_has_pictures(own, module):
     words = "--environment formula:Slider2 --algorithm sagg-riac --movements 40 --evaluate-at [] --repeats 0"
     assert command(main, [*words.replace("[]", "20").split(), "--board", "true", "--out", "runs"]) == 0
     assert pictures_of(Path("runs/sagg-riac/seed-000")).keys() == {"map/error", "map/competence"}
-
-
-HALVES = '''
-import numpy as np
-from sgimd_torch import Goals, InterestMap
-
-class Halves(Goals):
-    """A user's goal model; a run knows only its two regions."""
-
-    regions = ()
-
-    def __init__(self, problem):
-        super().__init__(problem)
-        self._whole = InterestMap(problem)
-        (region,) = self._whole.regions
-        self.regions = region.split(0, 0.5)
-
-    def sample(self, context):
-        return self._whole.sample(context)
-
-    def add(self, context, goal, competence, strategy="autonomous", gain=0.0):
-        self.regions = [self.regions[0].extend(np.array(goal), competence, gain, strategy), self.regions[1]]
-'''
-
-
-def test_the_regions_of_any_goal_model_are_shown(own, module):
-    module("halves", HALVES)
-    directory = live_as("Slider2", "--goals", "halves:Halves")
-    curves = curves_of(directory)
-    assert curves["regions/count"] == {50: 2, 100: 2}
-    assert {"competence/R0", "interest/R"} < curves.keys()
-    assert "map/competence" in pictures_of(directory)

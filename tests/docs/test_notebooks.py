@@ -36,28 +36,19 @@ def kinds(cell):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_the_stored_outputs_are_of_one_run_of_all_cells_and_small(name):
-    notebook = read(name)
+def test_what_is_stored_is_of_one_run_of_all_cells_small_and_knows_nothing_of_the_machine(name):
+    notebook, text = read(name), (FOLDER / f"{name}.ipynb").read_text(encoding="utf-8")
     nbformat.validate(notebook)
+    assert {*notebook.metadata} == {"kernelspec", "language_info"}
+    assert notebook.metadata.kernelspec.name == "python3"
+    assert not any(word in text for word in ("/home/", "/root/", "/tmp/", "/Users/", "http://"))
     assert [cell.execution_count for cell in codes(notebook)] == list(range(1, len(codes(notebook)) + 1))
     outputs = [output for cell in codes(notebook) for output in cell.outputs]
     assert {output.output_type for output in outputs} <= {"stream", "display_data", "execute_result"}  # no error
     assert {output.name for output in outputs if output.output_type == "stream"} == {"stdout"}  # no warning
     pictures = [output.data["image/png"] for output in outputs if "image/png" in output.get("data", {})]
     assert 0 < max(len(base64.b64decode(picture)) for picture in pictures) < 100_000
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_a_notebook_knows_nothing_of_the_machine_that_made_it(name):
-    notebook, text = read(name), (FOLDER / f"{name}.ipynb").read_text(encoding="utf-8")
-    assert not any(word in text for word in ("/home/", "/root/", "/tmp/", "/Users/", "http://"))
-    assert {*notebook.metadata} == {"kernelspec", "language_info"}
-    assert notebook.metadata.kernelspec.name == "python3"
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_files_that_a_notebook_links_exist(name):
-    links = re.findall(r"\]\(([^)#]+)\)", "".join(cell.source for cell in read(name).cells))
+    links = re.findall(r"\]\(([^)#]+)\)", "".join(cell.source for cell in notebook.cells))
     assert links
     assert not [link for link in links if not (FOLDER / link).exists()]
 

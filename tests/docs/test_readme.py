@@ -34,16 +34,7 @@ HOW_TO = tuple(
     f"docs/{name}.md"
     for name in ("own-robot", "reading-runs", "own-demonstrations", "teaching-by-hand", "own-teacher", "asking")
 )
-OTHERS = (  # each in a folder of its own
-    "docs/runs.md",
-    *(
-        f"docs/how-to/{name}.md"
-        for name in ("ablations", "gymnasium", "mujoco", "real-robot", "resuming", "several-robots", "sim-to-real")
-    ),
-    *(f"docs/explained/{name}.md" for name in ("random-numbers", "noise")),
-    pytest.param("docs/tutorial.md", marks=pytest.mark.slow),  # the rod's physics
-    pytest.param("docs/how-to/forward-model.md", marks=pytest.mark.slow),  # torch
-)
+SLOW = ("docs/tutorial.md", "docs/how-to/forward-model.md")  # the rod's physics; torch
 PAGES = [
     *ALONE,
     "CHANGELOG.md",
@@ -106,6 +97,10 @@ def blocks(page, *kinds):
             yield Block(page, text.count("\n", 0, match.start(3)) + 1, kind, name, body)
 
 
+# Pages with code that are read in a folder of their own.
+OTHERS = [page for page in PAGES if page not in (*ALONE, *HOW_TO) and any(blocks(page, "python", "sh", "xml"))]
+
+
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     """The working directory, from which modules can be imported, and are forgotten afterwards."""
@@ -129,7 +124,7 @@ def test_how_to_pages_work_one_after_the_other(folder):
         work_through(page)
 
 
-@pytest.mark.parametrize("page", OTHERS)
+@pytest.mark.parametrize("page", [pytest.param(page, marks=[pytest.mark.slow] * (page in SLOW)) for page in OTHERS])
 def test_a_page_works_from_top_to_bottom(page, folder):
     work_through(page)
 
@@ -173,7 +168,7 @@ def understand(name, words):
     """Read the words of a command up to where it needs what earlier commands would have made."""
     if name == "run":
         parse(words)
-    elif name in ("sweep", "suite"):
+    elif name == "sweep":
         assert command(_call, [name, *words, "--dry-run"]) == 0
     elif name == "teach" and not (words and words[0].startswith("runs/")):  # it would serve until Ctrl-C
         importlib.import_module(f"sgimd_torch.{WORDS['command'][name]}").options_of(words)

@@ -1,4 +1,4 @@
-"""Both directions of gymnasium: its environments keep our promises, ours pass its own check; the swimmer is a task."""
+"""Both directions of gymnasium: its environments keep our promises, ours pass its own check."""
 
 import gymnasium
 import numpy as np
@@ -6,19 +6,13 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from sgimd_torch.algorithms.practice import practice
-from sgimd_torch.demonstrations.fit import misfit_of
 from sgimd_torch.environments.check import check_environment
 from sgimd_torch.environments.controllers import Sinusoids
 from sgimd_torch.environments.from_gymnasium import FromGymnasium, measured_noise
 from sgimd_torch.environments.motor_primitives import GaussianPrimitive
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.protocol import SimulationError
-from sgimd_torch.environments.swimmer import Swimmer
 from sgimd_torch.environments.to_gymnasium import ToGymnasium
-from sgimd_torch.options.build import task_of
-from sgimd_torch.options.config import Config
-from sgimd_torch.runs.tasks import benchmark_of
-from sgimd_torch.runs.tasks.taught import demonstrations_of
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Box, stream
 
@@ -197,20 +191,6 @@ def test_an_observation_has_a_number_even_without_contexts():
     assert world.observation_space.contains(first)
 
 
-@pytest.mark.slow
-def test_hindsight_learns_on_a_robot_of_ours():
-    sb3 = pytest.importorskip("stable_baselines3")
-    world = ToGymnasium(PlanarArm(3))
-    settings = {"learning_rate": 1e-3, "ent_coef": 0.01, "seed": 0}
-    learner = sb3.SAC("MultiInputPolicy", world, replay_buffer_class=sb3.HerReplayBuffer, **settings)
-    learner.learn(600)
-    rewards = []
-    for seed in range(40):
-        observation, _ = world.reset(seed=seed)
-        rewards.append(world.step(learner.predict(observation, deterministic=True)[0])[1])
-    assert np.mean(rewards) > -0.4  # it was -.17; random movements have -.93
-
-
 def test_an_episode_of_ours_is_one_movement_whose_reward_is_the_distance_to_the_goal():
     arm = PlanarArm(3)
     world = ToGymnasium(arm)
@@ -257,44 +237,3 @@ class Angles:
 
     def at(self, theta, times):
         return np.tile(theta, (len(times), 1))
-
-
-@pytest.fixture(scope="module")
-def swimmer():
-    return Swimmer()
-
-
-def test_the_swimmer_keeps_every_promise(swimmer):
-    check_environment(swimmer)
-
-
-def test_the_noise_of_the_swimmer_is_as_announced(swimmer):
-    assert measured_noise(swimmer, stream(1001, "noise")) == pytest.approx(swimmer.outcome_noise, rel=0.25)
-
-
-def test_a_wave_along_its_body_moves_the_swimmer_and_the_opposite_one_moves_it_back():
-    still = Swimmer(start=0.0)
-    ahead, back = (still.execute(NO_CONTEXT, [1, 0, 0.5, 1, lag, 0.5, 0.25], stream(0, "any")) for lag in (0.25, 0.75))
-    assert np.linalg.norm(ahead) > 0.5
-    assert np.linalg.norm(back) > 0.5
-    assert ahead @ back < 0
-    assert np.linalg.norm(still.execute(NO_CONTEXT, [0, 0, 0.5, 0, 0, 0.5, 0.5], stream(0, "any"))) < 1e-9
-
-
-def test_the_swimmer_is_a_task_with_goals_and_demonstrations():
-    task = task_of(Config(parts={"environment": "swimmer"}))
-    benchmark, _, _ = benchmark_of(task, None)
-    assert len(benchmark.goals) > 100
-    shown, _, _ = demonstrations_of(task, None)
-    assert len(shown) == 100
-    translated = [task.environment.correspondence(each.times, each.trajectory) for each in shown]
-    misfits = [misfit_of(task.environment, *each) for each in zip(translated, shown, strict=True)]
-    assert np.median(misfits) == pytest.approx(0.0347, abs=5e-5)  # the hand shook
-    still = Swimmer(start=0.0)
-    for each in shown[:3]:
-        np.testing.assert_allclose(still.replay(each.times, each.trajectory), each.outcome, atol=1e-9)
-        theta = still.correspondence(each.times, each.trajectory)
-        landed = still.execute(NO_CONTEXT, theta, stream(0, "any"))
-        assert np.linalg.norm(landed - each.outcome) < 0.3
-    with pytest.raises(ValueError, match=r"a movement lasts 5.96 s at most, the recording 6 s"):
-        still.replay(0.04 * np.arange(151), np.zeros((151, 2)))

@@ -73,9 +73,8 @@ SPOILT = {
         3: {"sgim-im-83": 6.0},
         4: {"sgim-acts-2": 0.9},
         8: {"sgim-im-cost-10": 6.0},
-        9: {"sgim-eer": {1000: 0.3}},
-        10: {"practice.toss-blind": {2000: 0.2}},
-        11: {"practice.toss": {1000: 0.3}},
+        9: {"practice.toss-blind": {2000: 0.2}},
+        10: {"practice.toss": {1000: 0.3}},
     },
 }
 OTHERS = {  # spoilt by other than errors: the noise floor, counts of tiles, goals and requests
@@ -88,7 +87,7 @@ OTHERS = {  # spoilt by other than errors: the noise floor, counts of tiles, goa
     ("asking", 5): {"asked": {"sgim-acts-four": dict.fromkeys(FOUR, (50, 40, 20, 0, 0, 0))}},
     ("asking", 6): {"asked": {"sgim-acts-halves": dict.fromkeys(("low-half", "high-half"), (50, 40, 20, 14, 0, 0))}},
     ("asking", 7): {"asked": {"sgim-im-cost-10": {"all": (140, 112, 60, 60, 50, 40)}}},
-    ("asking", 12): {"asked": {"sgim-im.toss": {"all": (140, 110, 60, 60, 40, 50)}}},
+    ("asking", 11): {"asked": {"sgim-im.toss": {"all": (140, 110, 60, 60, 40, 50)}}},
 }  # fmt: skip
 CASES = [
     *((page, claim, {"spoilt": change}) for page, found in SPOILT.items() for claim, change in found.items()),

@@ -72,7 +72,7 @@ def test_each_evaluation_is_a_row_the_failed_are_reported_and_a_second_start_doe
             (task, when, "process") for when in (20, 40)
         ]
         run = read_run(tmp_path / "runs" / variant / "seed-000")
-        assert [*theirs.error] == run.answers["own"]["mean_error"].tolist()
+        assert [*theirs.error] == run.evaluations["own"]["mean_error"].tolist()
         assert theirs.floor.isna().all()  # the noise floor is measured only where a variant says so
     explored = read_table(tmp_path / "results", "explored.csv").set_index("variant")
     assert explored.goals["random"] == 0

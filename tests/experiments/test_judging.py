@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from evidence import Evidence, movements_to_reach
-from judging import Claim, at_least, at_most, judge
+from judging import Claim, at_least, at_most, holm, judge
 from made_up import row, write, write_rows
 from sgimd_torch.views.statistics import Interval
 
@@ -87,3 +87,12 @@ def test_a_level_is_reached_where_the_line_between_evaluations_first_crosses_it(
     errors = np.array([[4.0, 3, 1, 2], [1, 1, 1, 1], [4, 4, 4, 3], [2, 4, 2, 1]])
     np.testing.assert_allclose(movements_to_reach(movements, errors, 2.0), [750, 250, np.inf, 250])
     np.testing.assert_allclose(movements_to_reach(movements, errors[:2], [3.5, 0.5]), [375, np.inf])
+
+
+def test_holm_by_intervals_is_holm_by_p_values():
+    """An interval at a level rejects where p is at most 1 - level."""
+    for p in np.random.default_rng(0).random((200, 6)) ** 4:
+        order = np.argsort(p)
+        adjusted = np.maximum.accumulate(p[order] * np.arange(6, 0, -1))
+        expected = set(order[adjusted <= 0.05].tolist())
+        assert holm(range(6), lambda claim, level, p=p: p[claim] <= 1 - level) == expected

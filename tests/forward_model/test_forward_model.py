@@ -1,16 +1,14 @@
 """The forward model: what it learns, how sure it is, and what it refuses."""
 
-import json
 import pickle
 
 import numpy as np
 import pytest
 import torch
-from safetensors.torch import save_file
 
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.forward_model.diagnostics import coverage
-from sgimd_torch.forward_model.model import ForwardModel, load_forward_model
+from sgimd_torch.forward_model.model import ForwardModel
+from sgimd_torch.forward_model.shared import coverage
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import stream
 from worlds import NO_CONTEXT, remember
@@ -111,7 +109,7 @@ def test_a_refresh_waits_for_enough_new_exemplars():
     assert model.refresh(memory) is None
     assert not model.trained
     memory = remembered(50)
-    assert model.refresh(memory).steps == 50
+    assert model.refresh(memory).fit.steps == 50
     before = weights(model)
     assert model.refresh(memory) is None
     assert torch.equal(weights(model), before)
@@ -139,7 +137,7 @@ def test_adams_moments_survive_a_refresh():
 
 def test_learning_stops_when_held_out_exemplars_are_predicted_no_better():
     noise = stream(0, "noise").random((60, 5))
-    assert ForwardModel(0, 3, 2, rate=100).refresh(remember(noise[:, :3], noise[:, 3:])).steps < 2500
+    assert ForwardModel(0, 3, 2, rate=100).refresh(remember(noise[:, :3], noise[:, 3:])).fit.steps < 2500
 
 
 def test_a_refresh_says_what_was_predicted_for_the_new_exemplars_before_it_learnt_from_them():
@@ -159,11 +157,11 @@ def test_after_a_divergence_the_weights_before_it_are_back(lr):
     model = taught(remembered(300), rate=1.0)
     before, error, usual = weights(model), model.relative_error, model.lr
     model.lr, model._online.optimizer = lr, None
-    assert model.refresh(remembered(400)).diverged
+    assert model.refresh(remembered(400)).fit.diverged
     assert torch.equal(weights(model), before)
     assert model.relative_error == pytest.approx(error, rel=0.2)  # of more exemplars held out
     model.lr = usual
-    assert not model.refresh(remembered(500)).diverged
+    assert not model.refresh(remembered(500)).fit.diverged
 
 
 def interrupted(*_):
@@ -175,12 +173,12 @@ def test_a_refresh_that_is_interrupted_has_changed_nothing(monkeypatch):
     for model in (ForwardModel(0, 3, 2), whole):
         before, error = weights(model), model.relative_error
         with monkeypatch.context() as patch:
-            patch.setattr(model._online, "judge", interrupted)  # after the first steps
+            patch.setattr(model._online, "score", interrupted)  # after the first steps
             with pytest.raises(KeyboardInterrupt):
                 model.refresh(remembered(200))
         assert torch.equal(weights(model), before)
         assert model.relative_error == error
-        assert model.refresh(remembered(200)).steps == 200 - 100 * (model is whole)
+        assert model.refresh(remembered(200)).fit.steps == 200 - 100 * (model is whole)
     assert ForwardModel(0, 3, 2).relative_error == np.inf
 
 
@@ -206,72 +204,6 @@ def test_a_copy_for_another_process_predicts_the_same_and_learns_on(model, unsee
         copy.predict(NO_CONTEXT, unseen.thetas).mean, model.predict(NO_CONTEXT, unseen.thetas).mean
     )
     assert copy.refresh(remembered(500)).first == 400
-
-
-@pytest.mark.parametrize("noise_heads", [True, False])
-def test_a_saved_model_predicts_the_same_and_keeps_its_relative_error(tmp_path, unseen, noise_heads):
-    model = taught(remembered(100), noise_heads=noise_heads, members=2)
-    model.save(tmp_path / "model.safetensors")
-    loaded = load_forward_model(tmp_path / "model.safetensors")
-    for saved, read in zip(
-        model.predict(NO_CONTEXT, unseen.thetas), loaded.predict(NO_CONTEXT, unseen.thetas), strict=True
-    ):
-        np.testing.assert_array_equal(saved, read)
-    assert (loaded.noise_heads, loaded.relative_error) == (noise_heads, model.relative_error)
-    assert [path.name for path in tmp_path.iterdir()] == ["model.safetensors"]
-
-
-@pytest.mark.parametrize("header", [None, {}, {"model": "{"}, {"model": "[" * 100}])
-def test_weights_of_something_else_are_refused_by_name(tmp_path, model, header):
-    path = tmp_path / "model.safetensors"
-    save_file(model.state_dict(), path, header)
-    with pytest.raises(ValueError, match=r"model\.safetensors is no forward model"):
-        load_forward_model(path)
-
-
-@pytest.mark.parametrize(
-    "change",
-    [{"members": 10**9}, {"theta_dim": 10**9}, {"outcome_dim": 10**9}, {"hidden": 4}],
-)
-def test_a_header_that_does_not_fit_the_weights_takes_no_memory(tmp_path, model, change):
-    path = tmp_path / "model.safetensors"
-    about = {**model.sizes, "members": model.members, "noise_heads": model.noise_heads, **change}
-    save_file(model.state_dict(), path, {"model": json.dumps(about)})
-    with pytest.raises(ValueError, match=r"model\.safetensors is no forward model"):
-        load_forward_model(path)
-
-
-def test_a_file_cut_short_anywhere_is_refused_by_name(tmp_path, model):
-    path = tmp_path / "saved"
-    model.save(path)
-    whole = path.read_bytes()
-    for length in [*range(0, len(whole), len(whole) // 50), len(whole) - 1]:
-        path.write_bytes(whole[:length])
-        with pytest.raises(ValueError, match="saved is no"):
-            load_forward_model(path)
-
-
-def test_a_missing_file_and_a_folder_are_called_so(tmp_path, model):
-    with pytest.raises(FileNotFoundError, match="nothing"):
-        load_forward_model(tmp_path / "nothing")
-    for use in (model.save, load_forward_model):
-        with pytest.raises(IsADirectoryError, match="directory"):
-            use(tmp_path)
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_misspelt_option_of_a_model_to_be_loaded_is_not_blamed_on_the_file(tmp_path, model):
-    model.save(tmp_path / "model.safetensors")
-    with pytest.raises(TypeError, match="ratee"):
-        load_forward_model(tmp_path / "model.safetensors", ratee=3)
-
-
-def test_a_loaded_model_learns_on(tmp_path):
-    taught(remembered(100)).save(tmp_path / "model.safetensors")
-    loaded = load_forward_model(tmp_path / "model.safetensors", every=20, rate=1.0)
-    assert loaded.refresh(remembered(110)) is None
-    refresh = loaded.refresh(remembered(120))
-    assert (refresh.first, refresh.steps, len(refresh.predicted.mean)) == (100, 20, 20)
 
 
 def test_before_it_has_learnt_it_predicts_nothing():

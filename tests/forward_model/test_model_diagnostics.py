@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sgimd_torch.forward_model.diagnostics import coverage
+from sgimd_torch.forward_model.shared import coverage
 from sgimd_torch.spaces import stream
 
 LEVELS = (0.1, 0.5, 0.8, 0.95, 0.99)

@@ -13,7 +13,7 @@ from sgimd_torch.forward_model import inverse as module
 from sgimd_torch.forward_model.inverse import ModelAlone, ModelInverse
 from sgimd_torch.forward_model.model import ForwardModel
 from sgimd_torch.forward_model.proved import ProvedModel
-from sgimd_torch.forward_model.shared import is_asked, model_of
+from sgimd_torch.forward_model.shared import model_of, uses_model
 from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.memory import Memory
 from sgimd_torch.options.signature import help_of, options_of
@@ -159,7 +159,7 @@ def test_all_parts_share_the_model_that_the_first_has_made(memory):
     problem = problem_of(memory)
     proved = ProvedModel(problem, members=2)
     few = problem.over(executed(ARM, memory.thetas[:3]))
-    assert model_of(problem, members=5) is ModelInverse(few).model is proved.through_model.model is proved.model
+    assert model_of(problem, members=5) is ModelInverse(few).model is proved.model_inverse.model is proved.model
     assert [each.model for each in problem.trained] == [proved.model]
     assert proved.model.members == 2
 
@@ -204,18 +204,18 @@ def same_answers(proved, expected, goals):
 
 def test_a_model_that_predicts_worse_than_the_process_is_not_asked():
     proved = lived(smooth, 500, rate=0.1)
-    assert proved.through_model.trusted  # on its own it would be
+    assert proved.model_inverse.trusted  # on its own it would be
     assert not proved.trusted
     goals = proved.problem.memory.outcomes[:3] + 0.01
     assert same_answers(proved, [proved.process(NO_CONTEXT, goal) for goal in goals], goals)
-    assert not is_asked(proved, proved.model)
-    assert is_asked(proved.process, proved.model)
+    assert not uses_model(proved, proved.model)
+    assert uses_model(proved.process, proved.model)
 
 
 def test_a_model_that_predicts_better_answers_once_there_were_enough_tests(proved):
     assert (lived(noisy, 150).trusted, proved.trusted) == (False, True)
     goals = proved.problem.memory.outcomes[:3] + 0.01
-    assert same_answers(proved, answers(proved.through_model, goals), goals)
+    assert same_answers(proved, answers(proved.model_inverse, goals), goals)
 
 
 def test_told_that_nothing_is_noisy_it_wants_better_predictions(proved):

@@ -10,8 +10,8 @@ from runs import LIVE, RUN, content_of, end, start, stopped_at
 from sgimd_torch.board.legend import LEGEND
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import Benchmark, save_benchmark
-from sgimd_torch.forward_model.listener import ModelListener
 from sgimd_torch.forward_model.model import ForwardModel
+from sgimd_torch.forward_model.shared import ModelListener
 from sgimd_torch.memory import Memory
 from sgimd_torch.options.build import build
 from sgimd_torch.options.command_line import main
@@ -114,7 +114,7 @@ def test_a_run_that_is_killed_and_resumed_ends_as_if_it_never_was(tmp_path, argu
 
 
 def test_a_run_without_a_model_writes_no_record_of_one_and_loads_no_library_for_it(tmp_path, arguments):
-    heavy = {"torch", "lightning", "safetensors", "tensorboard", "matplotlib"}
+    heavy = {"torch", "lightning", "tensorboard", "matplotlib"}
     loaded = f"{heavy} & set(sys.modules)"
     program = f"{RUN}; code = command_line.main(sys.argv[1:]); print({loaded}); sys.exit(code)"
     process = start(program, *arguments(tmp_path, "--movements", 60))
@@ -250,7 +250,7 @@ def test_the_board_shows_how_the_model_does_and_explains_it(reference):
 def test_a_run_that_learns_a_model_but_answers_without_it_is_evaluated_by_both(tmp_path, live):
     options = ("--search", "gradient", "--inverse", "linear", "--evaluated-by", "own,nearest,linear,model-alone")
     assert live(tmp_path, *options) == 0
-    answers = read_run(tmp_path / "sgim-d" / "seed-003").answers
-    assert list(answers) == ["own", "nearest", "linear", "model-alone"]
-    errors = {answer: each["mean_error"].tolist() for answer, each in answers.items()}
+    evaluations = read_run(tmp_path / "sgim-d" / "seed-003").evaluations
+    assert list(evaluations) == ["own", "nearest", "linear", "model-alone"]
+    errors = {inverse: columns["mean_error"].tolist() for inverse, columns in evaluations.items()}
     assert errors["own"] == errors["linear"] != errors["model-alone"]

@@ -1,13 +1,9 @@
-"""Every goal model keeps the same promises; and what the interest map's rivals without a tree do with progress."""
-
-from functools import partial
+"""Every goal model keeps the same promises; and uniform goals."""
 
 import numpy as np
 import pytest
 
 from sgimd_torch.goals.interest_map import InterestMap
-from sgimd_torch.goals.progress_grid import ProgressGrid
-from sgimd_torch.goals.regions import absolute_progress, paired_progress
 from sgimd_torch.goals.uniform import UniformGoals
 from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.options.catalogue import WORDS
@@ -16,16 +12,11 @@ from worlds import NO_CONTEXT, part, problem, remember
 
 LINE, SQUARE = Box.cube(0, 1, 1), Box.cube(0, 1, 2)
 
-PAIRED = {
-    "paired": partial(InterestMap, window=20, progress=paired_progress),
-    "paired grid": partial(ProgressGrid, cells=3, progress=paired_progress),
-}
 
-
-@pytest.fixture(params=[*WORDS["goals"], *PAIRED])
+@pytest.fixture(params=WORDS["goals"])
 def make(request):
     """Every goal model."""
-    return PAIRED.get(request.param) or part("goals", request.param)
+    return part("goals", request.param)
 
 
 def in_a_context(seed):
@@ -90,39 +81,12 @@ def test_uniform_goals_are_uniform_whatever_was_learnt():
     assert np.abs(counts - 500).max() < 5 * np.sqrt(5000 * 0.1 * 0.9)  # five standard deviations
 
 
-def test_a_cell_forgets_what_lies_before_its_window_and_counts_it():
-    goals = ProgressGrid(problem(outcomes=LINE), cells=2, window=4, progress=absolute_progress)
-    for competence in (-1, -0.9, -0.8, -0.7, -0.6, -0.5):
-        goals.add(NO_CONTEXT, [0.7], competence, gain=-competence)
-    goals.add(NO_CONTEXT, [0.2], 0)
-    below, above = goals.regions
-    assert above.competences.tolist() == [-0.8, -0.7, -0.6, -0.5]
-    assert above.gains.tolist() == [0.8, 0.7, 0.6, 0.5]
-    assert above.interest() == pytest.approx(0.1)
-    assert (above.attempts, below.attempts) == (6, 1)
-
-
-@pytest.mark.parametrize(("dim", "cells"), [(1, 100), (2, 10), (3, 5), (8, 2)])
-def test_cells_tile_the_space_about_a_hundred_of_them(dim, cells):
-    box = Box(np.full(dim, -100.0), np.arange(dim) + 100.3)
-    regions = ProgressGrid(problem(outcomes=box)).regions
-    assert len(regions) == cells**dim == len({region.path for region in regions})
-    lows, highs = (np.array([getattr(region, name) for region in regions]) for name in ("low", "high"))
-    assert np.prod((highs - lows) / box.sides, axis=1) == pytest.approx(np.full(len(regions), 1 / len(regions)))
-    for k in range(dim):
-        assert set(lows[:, k]) - {box.low[k]} == set(highs[:, k]) - {box.high[k]}  # to the last digit
-    assert regions[1].path == "R" + ".0" * (dim - 1) + ".1"
-
-
 @pytest.mark.parametrize(
     ("make", "options"),
     [
         *((InterestMap, {"window": window}) for window in (5, 2, 32)),  # the last is more than g_max
         *((InterestMap, {name: 0.0}) for name in ("cuts", "near")),
         *((InterestMap, {"max_aspect": aspect}) for aspect in (0.5, np.nan)),
-        *((ProgressGrid, {"window": window}) for window in (5, 2)),
-        (ProgressGrid, {"near": 0.0}),
-        *((ProgressGrid, {"cells": cells}) for cells in (0, 1000)),  # a million in all
     ],
 )
 def test_numbers_out_of_range_are_refused(make, options):

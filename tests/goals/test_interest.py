@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
 from sgimd_torch.goals.interest_map import InterestMap
-from sgimd_torch.goals.progress_grid import ProgressGrid
 from sgimd_torch.goals.regions import absolute_progress, gained_progress
 from sgimd_torch.spaces import Array, Box, stream
 from worlds import NO_CONTEXT, problem
@@ -25,12 +24,11 @@ def chi_square(counts: ArrayLike, probabilities: ArrayLike) -> float:
 
 
 MAP = partial(InterestMap, **BY_EQ_3)
-GRID = partial(ProgressGrid, cells=4, progress=absolute_progress)
 
 
-def four_regions_of_interest_1_2_3_4(make=MAP, **options):
+def four_regions_of_interest_1_2_3_4(**options):
     """The line, cut into quarters of interests .1, .2, .3 and .4: eq. (4) makes of them 0, 1/6, 2/6 and 3/6."""
-    goals = make(problem(outcomes=LINE, seed=1), window=4, **options)
+    goals = MAP(problem(outcomes=LINE, seed=1), window=4, **options)
     for index in range(112):
         goals.add(NO_CONTEXT, [(index * 0.6180339887) % 1], -1)  # the golden ratio spreads evenly: quarters
     assert len(goals.regions) == 4
@@ -45,9 +43,8 @@ def counts_in(regions: list, samples: Array) -> Array:
     return np.histogram(samples[:, 0], [region.low[0] for region in regions] + [1.0])[0]
 
 
-@pytest.mark.parametrize("make", [MAP, GRID], ids=["map", "grid"])
-def test_the_three_modes_share_the_goals_7_to_2_to_1_and_the_first_and_last_follow_interest_above_the_least(make):
-    goals = four_regions_of_interest_1_2_3_4(make, near=0.01)
+def test_the_three_modes_share_the_goals_7_to_2_to_1_and_the_first_and_last_follow_interest_above_the_least():
+    goals = four_regions_of_interest_1_2_3_4(near=0.01)
     samples = np.array([goals.sample(NO_CONTEXT) for _ in range(10_000)])
     counts = counts_in(goals.regions, samples)
     volumes = np.array([region.high[0] - region.low[0] for region in goals.regions])

@@ -11,12 +11,12 @@ def board_of(directory):
 
 def curves_of(directory):
     """The values {step: value} of each tag; fails if a tag has a step twice."""
-    board, found = board_of(directory), {}
+    board, curves = board_of(directory), {}
     for tag in board.Tags()["scalars"]:
         points = board.Scalars(tag)
-        found[tag] = {point.step: point.value for point in points}
-        assert len(found[tag]) == len(points), tag
-    return found
+        curves[tag] = {point.step: point.value for point in points}
+        assert len(curves[tag]) == len(points), tag
+    return curves
 
 
 def pictures_of(directory):

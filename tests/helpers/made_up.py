@@ -62,7 +62,6 @@ ERRORS = {  # errors (m) after 5000 movements by name, as in `Evidence`
     # Learners that ask.
     **dict.fromkeys(EXPERIMENTS["asking"], 0.019),
     "sgim-d-initial": 0.045,
-    "sgim-eer": 0.04,
     "sgim-im.toss": 0.5,
     "practice.toss-blind": 1.4,
 }
@@ -115,17 +114,17 @@ def write_rows(folder, spoilt=None, without=(), floor=0.98, asked=None, explored
                 value = factor * error(name, seed, movements)
                 rows.append(row(variant, seed, movements, answer or "process", value, floor * value))
     requests = [
-        (variant, seed, teacher, found[0] + seed % 3, *found[1:])
+        (variant, seed, teacher, counts[0] + seed % 3, *counts[1:])
         for variant, teachers in {**ASKED, **(asked or {})}.items()
         for seed in range(SEEDS)
-        for teacher, found in teachers.items()
+        for teacher, counts in teachers.items()
     ]
-    counts = [
+    reached = [
         (f"{name}{ending}", seed, tiles + seed, goals, near + (seed % 2) * (goals > 0))
         for name, (tiles, goals, near) in {**EXPLORED, **(explored or {})}.items()
         for ending in ("", "-large", "-letter", "-letter-large")
         for seed in range(SEEDS)
     ]
     write(folder, requests, "asked.csv")
-    write(folder, counts, "explored.csv")
+    write(folder, reached, "explored.csv")
     return write(folder, rows)

@@ -54,7 +54,7 @@ def odd_place(place):
 def as_alone(place, out, seeds):
     """Whether the runs in ``out`` equal the undisturbed runs in ``alone``."""
     places = [f"random/seed-{seed:03d}" for seed in seeds]
-    return [content_of(out / each) for each in places] == [content_of(place / "alone" / each) for each in places]
+    return all(content_of(out / run) == content_of(place / "alone" / run) for run in places)
 
 
 def said_by(process, code):

@@ -47,15 +47,15 @@ def about_of(directory):
         return record.about
 
 
-def settle(directory, **about):
+def write_about(directory, **about):
     """Replace entries of the table ``about`` of a run."""
     with Record(directory / FILE, write=True) as record:
-        record.settle(**about)
+        record.about |= about
         record.commit()
 
 
 def edit(path, *statements):
-    """Change the file of a record by SQL, without new seals."""
+    """Change the file of a record by SQL, without new checksums."""
     with closing(sqlite3.connect(path)) as connection, connection:
         for statement in statements:
             connection.execute(statement)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
@@ -59,11 +60,11 @@ def problem(
         outcomes = outcomes or Box.cube(-1, 1, t)
         at_rest = outcomes.clip(np.zeros(outcomes.dim)) if rest is None else np.array(rest, dtype=float)
         environment = Boxes(contexts or Box.cube(0, 1, c), policies or Box.cube(0, 1, p), outcomes, at_rest, noise)
-    found = Problem(environment, seed, inverse=inverse)
+    made = Problem(environment, seed, inverse=inverse)
     if memory is not None:
-        found = found.over(memory)
-        found.inverse = inverse(found)
-    return found
+        made = made.over(memory)
+        made.inverse = inverse(made)
+    return made
 
 
 def last_posture(times: Array, trajectory: Array) -> Array:
@@ -161,12 +162,12 @@ def executed(arm: PlanarArm, thetas: Array) -> Memory:
     return memory
 
 
-ALGORITHMS = {
-    "random": lambda arm, seed: random_exploration(arm, seed),
-    "sagg-riac": lambda arm, seed: sagg_riac(arm, seed),
-    "observation": lambda arm, seed: observation(arm, seed, correspondence=last_posture),
-    "imitation": lambda arm, seed: imitation(arm, seed, correspondence=last_posture),
-    "sgim-d": lambda arm, seed: sgim_d(arm, seed, correspondence=last_posture),
+ALGORITHMS: dict[str, Callable[..., Learner]] = {
+    "random": random_exploration,
+    "sagg-riac": sagg_riac,
+    "observation": partial(observation, correspondence=last_posture),
+    "imitation": partial(imitation, correspondence=last_posture),
+    "sgim-d": partial(sgim_d, correspondence=last_posture),
 }
 TAUGHT = {"observation", "imitation", "sgim-d"}
 

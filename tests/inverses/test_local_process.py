@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info
 
-from sgimd_torch.environments.toys import Toy, toss, two_elbows
+from experiments.toys import Toy, toss, two_elbows
 from sgimd_torch.inverses import kernels
 from sgimd_torch.inverses.gaussian_process import Kernel, choose_kernel, fit_lengths, one_thread
 from sgimd_torch.inverses.local_process import LocalProcess
@@ -137,7 +137,7 @@ def mean_error(toy: Toy, inverse: Inverse, goals: Array, contexts: Array) -> flo
 
 
 def test_where_several_families_of_movements_lead_to_a_place_it_beats_the_nearest_and_the_linear() -> None:
-    toy = two_elbows()
+    toy = two_elbows().environment
     given, goals = played(toy, 300), played(toy, 40, seed=1).memory.outcomes
     process, nearest, linear = (
         mean_error(toy, make(given), goals, np.zeros((40, 0)))
@@ -147,7 +147,7 @@ def test_where_several_families_of_movements_lead_to_a_place_it_beats_the_neares
 
 
 def test_in_a_context_that_never_came_it_beats_the_nearest() -> None:
-    toy = toss()
+    toy = toss().environment
     given, asked = played(toy, 200), played(toy, 40, seed=1).memory
     process, nearest = (
         mean_error(toy, make(given), asked.outcomes, asked.contexts) for make in (LocalProcess, NearestNeighbour)
@@ -178,7 +178,7 @@ def test_stated_noise_is_averaged_out() -> None:
 
 
 def test_an_answer_says_what_it_expects_and_how_far_off_that_is() -> None:
-    toy, rng = two_elbows(), stream(0, "told")
+    toy, rng = two_elbows().environment, stream(0, "told")
     given = played(toy, 200, noise=0.05)
     given = remembering(given.memory.thetas, rng.normal(given.memory.outcomes, 0.05), noise=0.05)
     inverse, goals = LocalProcess(given), played(toy, 100, seed=1).memory.outcomes
@@ -190,7 +190,7 @@ def test_an_answer_says_what_it_expects_and_how_far_off_that_is() -> None:
 
 
 def test_units_do_not_matter() -> None:
-    toy = two_elbows()
+    toy = two_elbows().environment
     given, goals = played(toy, 120, noise=0.01), played(toy, 5, seed=1).memory.outcomes
     other = LocalProcess(remembering(given.memory.thetas * 7 + 3, given.memory.outcomes * 1000, noise=10.0))
     inverse = LocalProcess(given)
@@ -201,7 +201,7 @@ def test_units_do_not_matter() -> None:
 
 def in_wind(contexts: Array) -> float:
     """The mean error of a robot that does not feel the wind that it remembers."""
-    toy = two_elbows()
+    toy = two_elbows().environment
     memory, goals = played(toy, 200).memory, played(toy, 20, seed=1).memory.outcomes
     inverse = LocalProcess(remembering(memory.thetas, memory.outcomes, contexts[:200]))
     thetas = np.stack([estimate.theta for estimate in inverse.answer_many(contexts[200:], goals)])
@@ -228,7 +228,7 @@ def test_a_wide_movement_after_many_nearly_alike_is_answered(far: float) -> None
 
 
 def test_an_answer_depends_on_the_memory_and_not_on_when_it_was_asked() -> None:
-    whole = played(two_elbows(), 200)
+    whole = played(two_elbows().environment, 200)
     thetas, outcomes, goal = whole.memory.thetas, whole.memory.outcomes, np.array([0.3, 0.2])
     inverse = LocalProcess(remembering(thetas[:50], outcomes[:50]))
     inverse(NO_CONTEXT, goal)

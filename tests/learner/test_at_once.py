@@ -1,27 +1,24 @@
-"""Several robots move at once: one learner, an attempt for each robot, and a life that repeats bit for bit."""
+"""Several robots move at once: one learner, an attempt for each robot; what one does, or fails to do, is its own."""
 
 import numpy as np
 import pytest
 
-from sgimd_torch import session
+from sgimd_torch import load_life, save_life, session
 from sgimd_torch.algorithms.practice import practice, practice_taught
-from sgimd_torch.asking.algorithms import SEARCHING, sgim_acts
-from sgimd_torch.asking.teachers import AnsweringTeacher
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.learner.events import Kind
 from sgimd_torch.record import Record
 from sgimd_torch.session import NoOutcomeError, run
-from sgimd_torch.spaces import Failure, Move, stream
+from sgimd_torch.spaces import Failure, stream
 from sgimd_torch.teachers import PeriodicTeacher, at_once
-from worlds import ALGORITHMS, NO_CONTEXT, TAUGHT, demonstrations, last_posture, make
+from worlds import NO_CONTEXT, demonstrations, last_posture, make
 
 ARM = PlanarArm(5, noise=0.01)
 SHOWN = demonstrations(ARM)
 LEARNERS = {
-    **{name: lambda name=name: make(name, ARM) for name in ALGORITHMS},
+    "sgim-d": lambda: make("sgim-d", ARM),
     "practice": lambda: practice(ARM, 0),
     "practice-taught": lambda: practice_taught(ARM, 0, correspondence=last_posture),
-    "asking": lambda: sgim_acts(ARM, 0, teachers=teachers(), correspondence=last_posture, **SEARCHING),
 }
 
 
@@ -30,55 +27,15 @@ def _all_robots_join_soon(monkeypatch):
     monkeypatch.setattr(session, "JOINS_EVERY", 1)
 
 
-def teachers():
-    return {"ann": AnsweringTeacher(SHOWN[:5], stream(0, "ann"), takes=2)}
-
-
-class Lossy(PlanarArm):
-    """Loses one movement in nine, known by its stream."""
-
-    execute_many = None
-
-    def execute(self, context, theta, rng):
-        if rng.random() < 1 / 9:
-            raise ConnectionError("lost")
-        return super().execute(context, theta, rng)
-
-
-def lived(name, path, movements, at_once, *, events=(), robot=ARM):
-    """The learner, its episodes and its rows, after ``movements`` that go on from these ``events``."""
+def lived(name, path, movements, at_once, *, events=()):
+    """The learner, its episodes and its events, after ``movements`` that go on from these ``events``."""
     learner = LEARNERS[name]()
-    given = {"teachers": teachers()} if name == "asking" else {}
-    if name in {*TAUGHT, "practice-taught"}:
-        given["teacher"] = PeriodicTeacher(SHOWN, stream(0, "teacher"), every=11)
+    teacher = None if name == "practice" else PeriodicTeacher(SHOWN, stream(0, "teacher"), every=11)
     with Record.make(path, (0, 5, 2), {}) as record:
         for event in events:
             record.add(event)
-        episodes = list(run(learner, robot, 0, movements=movements, at_once=at_once, record=record, **given))
-        record.commit()
-        return learner, episodes, list(record.rows("events")), list(record.events())
-
-
-@pytest.mark.parametrize("name", LEARNERS)
-@pytest.mark.parametrize("robot", [ARM, Lossy(5, noise=0.01)], ids=["arm", "lossy"])
-def test_a_life_of_several_robots_goes_on_from_any_of_its_groups_as_if_never_stopped(name, robot, tmp_path):
-    learner, episodes, whole, events = lived(name, tmp_path / "whole", 48, 4, robot=robot)
-    assert [episode.index for episode in episodes] == list(range(48))
-    for movement in (4, 16, 28, 44):
-        kept = [event for event, row in zip(events, whole, strict=True) if row[0] < movement]
-        again, repeated, rows, _ = lived(name, tmp_path / str(movement), 48, 4, events=kept, robot=robot)
-        assert rows == whole
-        assert np.array_equal(again.memory.outcomes, learner.memory.outcomes)
-        for mine, theirs in zip(episodes, repeated, strict=True):
-            same = (mine.index, mine.reply, mine.failed) == (theirs.index, theirs.reply, theirs.failed)
-            assert same
-            assert (mine.demonstration is None) == (theirs.demonstration is None)
-
-
-@pytest.mark.parametrize("name", LEARNERS)
-def test_one_robot_at_once_is_the_usual_life(name, tmp_path):
-    usual, together = (lived(name, tmp_path / str(n), 60, 1)[2] for n in range(2))
-    assert usual == together
+        episodes = list(run(learner, ARM, 0, movements=movements, at_once=at_once, record=record, teacher=teacher))
+        return learner, episodes, list(record.events())
 
 
 def test_no_movement_of_a_group_knows_the_outcome_of_another():
@@ -130,6 +87,15 @@ def asked(learner, robots):
     return moves
 
 
+def test_attempts_that_began_in_another_order_than_the_robots_are_replayed_in_theirs(tmp_path):
+    learner, again = LEARNERS["practice"](), LEARNERS["practice"]()
+    learner.request(NO_CONTEXT, place=1)  # the attempt of robot 1 begins first
+    asked(learner, 2)
+    save_life(learner, tmp_path / "life.sqlite")
+    load_life(again, tmp_path / "life.sqlite")
+    assert np.array_equal(again.memory.thetas, learner.memory.thetas)
+
+
 def test_a_robot_that_fails_ends_its_own_attempt_alone():
     learner = make("sgim-d", ARM)
     for place in range(3):
@@ -149,16 +115,6 @@ def test_attempts_of_robots_in_other_contexts_keep_their_contexts():
     moves = learner.ask_many(contexts)
     learner.tell_many([arm.execute(c, move.theta, stream(0, "n")) for c, move in zip(contexts, moves, strict=True)])
     assert np.array_equal(learner.memory.contexts, contexts)
-
-
-def test_outcomes_that_were_not_told_are_not_expected_after_an_interruption():
-    learner = practice(ARM, 0)
-    learner.ask_many([NO_CONTEXT] * 3)
-    learner.interrupt()
-    assert [event.kind for event in learner.events()] == [Kind.INTERRUPTED] * 3
-    assert learner.idle
-    assert learner.movements == 0
-    assert all(isinstance(move, Move) for move in learner.ask_many([NO_CONTEXT] * 3))
 
 
 RIGHT = [[0.1, 0.2]] * 3
@@ -182,17 +138,6 @@ def test_wrong_outcomes_leave_the_learner_waiting(outcomes, error):
     assert (len(learner.memory), learner.movements, list(learner.events())) == (0, 0, [])
     learner.tell_many(RIGHT)
     assert len(learner.memory) == 3
-
-
-def test_telling_out_of_turn_and_asking_for_nobody_are_refused():
-    learner = practice(ARM, 0)
-    with pytest.raises(RuntimeError, match=r"ask.. has not proposed one"):
-        learner.tell_many(RIGHT)
-    with pytest.raises(ValueError, match="a context for each robot, got none"):
-        learner.ask_many([])
-    learner.ask_many([NO_CONTEXT] * 2)
-    with pytest.raises(RuntimeError, match=r"was tell.. forgotten"):
-        learner.ask_many([NO_CONTEXT] * 2)
 
 
 class Together(PlanarArm):
@@ -244,9 +189,9 @@ def test_too_many_failures_end_the_run_after_the_whole_group():
 
 
 @pytest.mark.parametrize("at_once", [1, 3])
-@pytest.mark.parametrize("name", ["sgim-d", "practice", "practice-taught"])
+@pytest.mark.parametrize("name", LEARNERS)
 def test_a_record_that_differs_by_rounding_goes_on_from_what_was_executed_and_says_so_once(name, at_once, tmp_path):
-    _, _, _, events = lived(name, tmp_path / "whole", 45, at_once)
+    _, _, events = lived(name, tmp_path / "whole", 45, at_once)
     rng = stream(0, "rounding")
     other = [
         event
@@ -255,7 +200,7 @@ def test_a_record_that_differs_by_rounding_goes_on_from_what_was_executed_and_sa
         for event in events
     ]
     with pytest.warns(RuntimeWarning, match="differs by rounding") as said:
-        learner, episodes, _, _ = lived(name, tmp_path / "other", 60, at_once, events=other)
+        learner, episodes, _ = lived(name, tmp_path / "other", 60, at_once, events=other)
     assert len(said) == 1
     executed = [event.theta for event in other if event.kind == Kind.MOVED]
     assert np.array_equal(learner.memory.thetas[: len(executed)], executed)

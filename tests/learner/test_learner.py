@@ -1,5 +1,7 @@
 """The learner: ask, execute, tell; a demonstration interrupts; what cannot be right is refused and changes nothing."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -67,19 +69,32 @@ def test_every_outcome_reaches_memory_and_its_attempt_and_the_next_attempt_begin
     assert (len(pursuit.contexts), pursuit.n_ended) == (3, 2)
 
 
-def test_ask_and_tell_alternate() -> None:
+def asked() -> Learner:
     robot = learner(Pursuit())
-    with pytest.raises(RuntimeError, match="ask"):
-        robot.tell([0.0, 0.0])
     robot.ask(NO_CONTEXT)
-    with pytest.raises(RuntimeError, match="tell"):
-        robot.ask(NO_CONTEXT)
-    with pytest.raises(RuntimeError, match="tell"):
-        robot.watch(LESSON)
-    robot.tell([0.0, 0.0])
-    with pytest.raises(RuntimeError, match="ask"):
-        robot.tell([0.0, 0.0])
-    assert len(robot.memory) == 1
+    return robot
+
+
+OUT_OF_TURN = {  # message: a learner, and what it refuses
+    "ask() has not proposed one": (lambda: learner(Pursuit()), lambda robot: robot.tell([0.0, 0.0])),
+    "a context for each robot, got none": (lambda: learner(Pursuit()), lambda robot: robot.ask_many([])),
+    "go_on_alone() needs a request": (lambda: learner(Pursuit()), lambda robot: robot.go_on_alone("")),
+    "was tell() forgotten? Without one, interrupt()": (asked, lambda robot: robot.ask(NO_CONTEXT)),
+    "watch() needs the outcome of the last movement first": (asked, lambda robot: robot.watch(LESSON)),
+    "add() needs the outcome of the last movement first": (
+        *(asked, lambda robot: robot.add(NO_CONTEXT, [0.5] * 4, [0.9, 0.1])),
+    ),
+}
+
+
+@pytest.mark.parametrize("message", OUT_OF_TURN)
+def test_what_comes_out_of_turn_is_refused_and_changes_nothing(message: str) -> None:
+    begin, act = OUT_OF_TURN[message]
+    robot = begin()
+    waits = bool(robot._asked)
+    with pytest.raises((RuntimeError, ValueError), match=re.escape(message)):
+        act(robot)
+    assert (len(robot.memory), robot.movements, bool(robot._asked)) == (0, 0, waits)
 
 
 DIVERGED = r"outcome .*did the simulation diverge.*theta was \[0\.1, 0\.1, 0\.1, 0\.1\]"
@@ -177,6 +192,19 @@ def test_an_interrupted_learner_forgets_what_it_asked_for_and_begins_again() -> 
     assert len(robot.memory) == 2
 
 
+def test_a_movement_made_elsewhere_enters_memory_but_counts_as_none() -> None:
+    robot, kinds = learner(Pursuit()), list[str]()
+    robot.listeners.append(lambda event: kinds.append(str(event.kind)))
+    robot.add(NO_CONTEXT, [0.5] * 4, [0.9, 0.1])
+    for theta, outcome, said in (
+        ([0.5, 0.5, 0.5, 1.5], [0.9, 0.1], "theta must lie in its box"),
+        ([0.5] * 4, [0.9, np.nan], "outcome"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            robot.add(NO_CONTEXT, theta, outcome)
+    assert (len(robot.memory), robot.movements, kinds) == (1, 0, ["added"])
+
+
 def test_a_demonstration_that_does_not_fit_is_refused_and_interrupts_nothing() -> None:
     pursuit = Pursuit()
     robot = learner(pursuit)
@@ -205,11 +233,6 @@ def test_a_strategy_without_any_movement_is_an_error_not_an_endless_loop() -> No
         learner(Pursuit(n=0)).ask(NO_CONTEXT)
 
 
-def test_there_is_no_context_to_keep_while_nothing_is_under_way() -> None:
-    with pytest.raises(RuntimeError, match="idle"):
-        _ = sagg_riac(PlanarArm(4), 0).context
-
-
 def test_what_callers_hand_in_may_change_afterwards() -> None:
     pursuit = Pursuit(n=2, context_dim=1)
     robot = learner(pursuit)
@@ -219,7 +242,7 @@ def test_what_callers_hand_in_may_change_afterwards() -> None:
     for array in (context, outcome, shown):
         array[:] = 9.0
     assert pursuit.contexts == [np.array([0.1])]
-    assert robot.context.tolist() == [0.1]
+    assert robot.context_at(0).tolist() == [0.1]
     assert robot.memory.outcomes.tolist() == [[0.2, 0.3]]
     robot.watch(lesson)
     move = robot.ask([0.1])
@@ -229,7 +252,7 @@ def test_what_callers_hand_in_may_change_afterwards() -> None:
 def test_what_the_learner_hands_out_is_read_only() -> None:
     robot = learner(Pursuit(context_dim=1))
     move = robot.ask([0.1])
-    for array in (move.theta, robot.context):
+    for array in (move.theta, robot.context_at(0)):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 9.0
 

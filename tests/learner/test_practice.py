@@ -3,14 +3,13 @@
 import numpy as np
 import pytest
 
+from experiments.toys import toss, toy_benchmark, two_elbows
 from sgimd_torch.algorithms.paper import sagg_riac
 from sgimd_torch.algorithms.practice import practice, practice_taught
-from sgimd_torch.environments.toys import toss, two_elbows
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.goals.uniform import UniformGoals
 from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.learner import Learner
-from sgimd_torch.runs.tasks.toys import toy_benchmark
 from sgimd_torch.searches.perturb import Perturb
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Demonstration
@@ -25,7 +24,7 @@ def after(learner: Learner, robot, seed: int, movements: int = 200) -> Learner:
 
 @pytest.mark.parametrize(("make", "side"), [(toss, 0.4), (two_elbows, 0.1)])
 def test_practice_beats_uniform_goals_with_the_nearest_and_noise(make, side):
-    robot = make()
+    robot = make().environment
     goals = toy_benchmark(robot, side).goals
     for seed in (1, 2):
         ours = practice(robot, seed)
@@ -38,7 +37,7 @@ def test_practice_beats_uniform_goals_with_the_nearest_and_noise(make, side):
 
 
 def test_taught_practice_does_once_what_it_is_shown_and_then_pursues_goals_of_its_own():
-    robot = two_elbows()
+    robot = two_elbows().environment
     shown = [Demonstration(np.zeros(0), np.arange(2.0), np.stack((t, t)), np.zeros(2)) for t in np.eye(3)]
     teacher = InitialTeacher(shown, np.random.default_rng(0), every=1)
     learner = practice_taught(robot, 0, correspondence=lambda times, trajectory: trajectory[-1])

@@ -81,7 +81,7 @@ def test_a_run_makes_the_movements_that_it_always_made(run, tmp_path, reference)
 def test_a_run_in_two_parts_ends_with_the_errors_that_it_always_had(run, tmp_path, reference):
     found = lived(run, 240, tmp_path, until=130)
     check_movements(found, reference, run)
-    for answer, table in found.answers.items():
-        kept = reference[f"{run}/errors/{answer}"]
+    for inverse, table in found.evaluations.items():
+        kept = reference[f"{run}/errors/{inverse}"]
         columns = [table[name] for name in ("movements", "mean_error", "median_error", "noise_floor")]
         np.testing.assert_allclose(np.stack(columns), kept, rtol=1e-9)

@@ -19,8 +19,8 @@ print(*side.nearest(np.array([[3.2]]), 2)[0])
 """
 LIFE = """
 from sgimd_torch import practice, run
-from sgimd_torch.environments.toys import two_elbows
-robot = two_elbows()
+from experiments.toys import two_elbows
+robot = two_elbows().environment
 learner = practice(robot, 1000)
 for _ in run(learner, robot, 1000, movements=300): pass
 print(hash(learner.memory.thetas.tobytes()))

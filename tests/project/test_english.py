@@ -44,16 +44,16 @@ HELP = starts_with(CONTINUING, THE_SAME)
 AFTER_A_SHAPE = r"``\([^`]*\)``,? *(?:(?:in|by|of|at|from|to|on) which|what|as|its|that)\b"
 DESCRIPTION = starts_with(CONTINUING + VERBS, VERB_AND_OBJECT, SENTENCE, AFTER_A_SHAPE, "$")
 PLACES: dict[str, list[Path]] = {}
-for each in sorted(path for top in ("sgimd_torch", "experiments", "scripts") for path in (ROOT / top).rglob("*.py")):
-    folder = each.parent if each.parent.name != "sgimd_torch" else each.with_suffix("")
-    PLACES.setdefault(folder.relative_to(ROOT).as_posix().removeprefix("sgimd_torch/"), []).append(each)
+for file in sorted(path for top in ("sgimd_torch", "experiments", "scripts") for path in (ROOT / top).rglob("*.py")):
+    folder = file.parent if file.parent.name != "sgimd_torch" else file.with_suffix("")
+    PLACES.setdefault(folder.relative_to(ROOT).as_posix().removeprefix("sgimd_torch/"), []).append(file)
 
 
 def descriptions(tree: ast.AST):
     for node in ast.walk(tree):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and (text := ast.get_docstring(node)):
-            for each in docstring_parser.parse(text, docstring_parser.DocstringStyle.GOOGLE).params:
-                yield each.arg_name, " ".join((each.description or "").split())
+            for parameter in docstring_parser.parse(text, docstring_parser.DocstringStyle.GOOGLE).params:
+                yield parameter.arg_name, " ".join((parameter.description or "").split())
 
 
 def helps(tree: ast.AST):
@@ -70,13 +70,13 @@ def test_descriptions_make_sense_alone_and_words_have_one_meaning(place):
     bad = []
     for path in PLACES[place]:
         tree = ast.parse(source := path.read_text("utf-8"))
-        found = [f"{name}: {text}" for name, text in descriptions(tree) if DESCRIPTION.match(text)]
-        found += [f"help: {text}" for text in helps(tree) if HELP.match(text)]
+        wrong = [f"{name}: {text}" for name, text in descriptions(tree) if DESCRIPTION.match(text)]
+        wrong += [f"help: {text}" for text in helps(tree) if HELP.match(text)]
         named = [
             node.arg if isinstance(node, ast.arg) else f"def {getattr(node, 'name', '')}" for node in ast.walk(tree)
         ]
-        found += [f"{name}: write {AMBIGUOUS[name]}" for name in named if name in AMBIGUOUS]
-        bad += [f"{path.name}: {each}" for each in found + QUAINT.findall(source)]
+        wrong += [f"{name}: write {AMBIGUOUS[name]}" for name in named if name in AMBIGUOUS]
+        bad += [f"{path.name}: {text}" for text in wrong + QUAINT.findall(source)]
     assert not bad, "\n".join(bad)
 
 

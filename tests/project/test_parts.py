@@ -28,7 +28,7 @@ KINDS = {
     "social": parts.Social,
 }
 LEARNING = (
-    *("parts", "strategies", "algorithms", "learner", "session", "goals", "inverses", "searches", "explore", "asking"),
+    *("parts", "strategies", "algorithms", "learner", "session", "goals", "inverses", "searches", "asking"),
     *("rivals", "teachers", "forward_model", "competence", "evaluation", "options/build", "runs/run"),
 )
 BY_NAME = {"getattr", "hasattr", "attrgetter"}
@@ -41,31 +41,31 @@ SIGNATURES = {"signature", "Signature", "getfullargspec", "parameters_of", "__co
 OPTIONS = {  # files and definitions that may read the parameters of a function; why
     ("options/signature", None): "the signature is the option",
     ("options/config", None): "options of the parts that a run has chosen",
-    ("options/catalogue", "call_checked"): "refuses what a user's own function does not take",
+    ("options/built", "call_checked"): "refuses what a user's own function does not take",
 }
 
 
 def uses(names: set[str], package: Path) -> set[tuple[str, str | None]]:
     """Pairs (file, definition) that use one of these names; the definition is None for code outside definitions."""
-    found = set()
+    users = set()
     for path in sorted(package.rglob("*.py")):
         place = path.relative_to(package).with_suffix("").as_posix()
         for top in ast.parse(path.read_text(encoding="utf-8")).body:
-            inside = {each.id for each in ast.walk(top) if isinstance(each, ast.Name)}
-            inside |= {each.attr for each in ast.walk(top) if isinstance(each, ast.Attribute)}
+            inside = {node.id for node in ast.walk(top) if isinstance(node, ast.Name)}
+            inside |= {node.attr for node in ast.walk(top) if isinstance(node, ast.Attribute)}
             if names & inside:
-                found.add((place, top.name if isinstance(top, ast.FunctionDef | ast.ClassDef) else None))
-    return found
+                users.add((place, top.name if isinstance(top, ast.FunctionDef | ast.ClassDef) else None))
+    return users
 
 
 def test_no_part_is_asked_by_name_what_it_can_do():
-    found = {(place, name) for place, name in uses(BY_NAME, PACKAGE) if place.startswith(LEARNING)}
-    assert found - FIELDS.keys() == set()
+    users = {(place, name) for place, name in uses(BY_NAME, PACKAGE) if place.startswith(LEARNING)}
+    assert users - FIELDS.keys() == set()
 
 
 def test_no_part_is_given_things_by_the_names_of_its_parameters():
-    found = uses(SIGNATURES, PACKAGE)
-    assert {(place, name) for place, name in found if not {(place, name), (place, None)} & OPTIONS.keys()} == set()
+    users = uses(SIGNATURES, PACKAGE)
+    assert {(place, name) for place, name in users if not {(place, name), (place, None)} & OPTIONS.keys()} == set()
 
 
 def test_a_use_by_name_is_found(tmp_path):
@@ -90,13 +90,13 @@ def test_every_part_is_built_from_the_problem_and_keywords_with_defaults(kind, w
     make = part(kind, word)
     first, *others = inspect.signature(function_of(make)).parameters.values()
     assert first.name == "problem"
-    assert {each.kind for each in others} <= {inspect.Parameter.KEYWORD_ONLY}
-    assert [each.name for each in others if each.default is inspect.Parameter.empty] == []
+    assert {parameter.kind for parameter in others} <= {inspect.Parameter.KEYWORD_ONLY}
+    assert not [parameter.name for parameter in others if parameter.default is inspect.Parameter.empty]
     assert isinstance(KINDS[kind].of(make, given), KINDS[kind])
 
 
 def test_an_inverse_model_is_added_by_whoever_has_read_the_base_classes_and_one_example():
-    lines = {each: len((PACKAGE / each).read_text().splitlines()) for each in ("parts.py", "inverses/nearest.py")}
+    lines = {file: len((PACKAGE / file).read_text().splitlines()) for file in ("parts.py", "inverses/nearest.py")}
     assert {kind.__module__ for kind in (*KINDS.values(), parts.Teacher, parts.Problem)} == {parts.__name__}
     assert lines["parts.py"] <= 270
     assert sum(lines.values()) <= 350
@@ -128,8 +128,8 @@ class Alien:
     [
         (Halfway, "Halfway has no add, which every Goals must have"),
         (partial(Goals), "Goals has no add, sample, which every Goals must have"),
-        ("grid", "must be a class or a function, got 'grid'; import ProgressGrid"),
-        ("gird", "unknown goals 'gird'; did you mean grid?"),
+        ("uniform", "must be a class or a function, got 'uniform'; import UniformGoals"),
+        ("unifrom", "unknown goals 'unifrom'; did you mean uniform?"),
         (UniformGoals(problem()), "must be a class or a function, got a finished UniformGoals"),
         (Unasked, "Goals Unasked cannot be called with the arguments of its kind: too many positional arguments"),
         (NelderMead, "NelderMead must make a Goals, made a NelderMead; derive a class from Goals of sgimd_torch.parts"),

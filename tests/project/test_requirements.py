@@ -1,4 +1,5 @@
-"""Versions: scripts/setup installs exactly the pinned packages, and the lowest allowed versions work, too."""
+"""Versions: scripts/setup installs exactly the pinned packages, the lowest allowed versions work, too, and the workflow
+runs the checks of scripts/test on all supported systems and Pythons."""
 
 import importlib.metadata
 import os
@@ -9,6 +10,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+import yaml
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
@@ -21,6 +23,7 @@ PINNED = dict(
 
 
 NAME = PROJECT["project"]["name"]
+WORKFLOW = yaml.safe_load((ROOT / ".github/workflows/tests.yml").read_text(encoding="utf-8"))
 BUILD = [Requirement(text) for text in PROJECT["build-system"]["requires"]]
 
 
@@ -123,3 +126,22 @@ SMOKE = (
     *("environments", "goals", "inverses", "rivals", "forward_model", "board", "figures"),
     *("runs/test_run.py", "views/test_film.py"),
 )
+
+
+def test_the_workflow_runs_the_checks_that_one_runs_by_hand_and_builds_a_release():
+    (step,) = [step for step in WORKFLOW["jobs"]["test"]["steps"] if step.get("run") == "scripts/test"]
+    assert step["env"] == {"PYTHON": "python"}  # the Python that the workflow has set up
+    matrix = WORKFLOW["jobs"]["test"]["strategy"]["matrix"]
+    assert matrix["python"] == ["3.11", "3.12", "3.13"]
+    assert {*matrix["system"], *(entry["system"] for entry in matrix["include"])} == {"ubuntu-latest", "macos-latest"}
+    commands = [step["run"] for step in WORKFLOW["jobs"]["package"]["steps"] if "run" in step]
+    assert commands[1:] == ["python -m build", "python -m twine check --strict dist/*"]
+
+
+def test_the_workflow_may_read_only_and_its_actions_have_a_version():
+    assert WORKFLOW["permissions"] == {"contents": "read"}
+    for job in WORKFLOW["jobs"].values():
+        assert "permissions" not in job
+        actions = [step["uses"] for step in job["steps"] if "uses" in step]
+        assert actions
+        assert all(name.rpartition("@v")[2].isdecimal() for name in actions)

@@ -2,6 +2,7 @@
 
 import ast
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -13,7 +14,7 @@ from sgimd_torch.options.catalogue import WORDS
 
 ROOT = Path(__file__).parents[2]
 ROOMS = ("forward_model", "asking", "teach", "rivals")
-KEPT = ("goals", "inverses", "searches", "explore", "learner", "memory", "record", "runs", "teachers", "demonstrations")
+KEPT = ("goals", "inverses", "searches", "learner", "memory", "record", "runs", "teachers", "demonstrations")
 
 
 def words_of(room):
@@ -21,16 +22,17 @@ def words_of(room):
 
 
 def without(room, folder):
-    """Copy package and tests to ``folder`` without a room; returns the number of lines deleted from the catalogue."""
+    """Copy package and tests to ``folder`` without a room; returns the number of lines deleted from the table."""
     for name in ("sgimd_torch", "tests"):
         shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(ROOT / "pyproject.toml", folder)
     for name in ("scripts/documentation", "experiments"):
         (folder / name).mkdir(parents=True)
+    shutil.copy(ROOT / "experiments/toys.py", folder / "experiments")  # robots of tests
     shutil.rmtree(folder / "sgimd_torch" / room)
     table = folder / "sgimd_torch/options/catalogue.py"
     lines = table.read_text().splitlines(keepends=True)
-    kept = [line for line in lines if f'": "{room}.' not in line]
+    kept = [line for line in lines if not re.match(rf"\w+ +{room}\.", line)]
     table.write_text("".join(kept))
     return len(lines) - len(kept)
 
@@ -42,7 +44,7 @@ def test_nothing_outside_a_room_imports_it(room):
             continue
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             names = [node.module or ""] if isinstance(node, ast.ImportFrom) else []
-            names += [each.name for each in node.names] if isinstance(node, ast.Import) else []
+            names += [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             assert not any(f"{name}.".startswith(f"sgimd_torch.{room}.") for name in names), path
 
 
@@ -50,7 +52,8 @@ def test_nothing_outside_a_room_imports_it(room):
 @pytest.mark.parametrize("room", ROOMS)
 def test_without_a_room_the_rest_imports_runs_and_passes_its_own_tests(room, tmp_path):
     words = words_of(room)
-    assert without(room, tmp_path) == len(words) > 0
+    assert words
+    assert without(room, tmp_path) > 0
 
     def go(*arguments):
         environment = {**os.environ, "PYTHONPATH": str(tmp_path), "OMP_NUM_THREADS": "1"}
@@ -61,18 +64,21 @@ def test_without_a_room_the_rest_imports_runs_and_passes_its_own_tests(room, tmp
         return done.stdout
 
     walk = "import importlib, pkgutil, sgimd_torch as s; print(s.__path__[0])\n"
-    walk += "for each in pkgutil.walk_packages(s.__path__, 'sgimd_torch.'):\n"
-    walk += "    each.name.endswith('__main__') or importlib.import_module(each.name)"
+    walk += "for module in pkgutil.walk_packages(s.__path__, 'sgimd_torch.'):\n"
+    walk += "    module.name.endswith('__main__') or importlib.import_module(module.name)"
     assert go("-c", walk).strip() == str(tmp_path / "sgimd_torch")
     short = ["--environment", "planar-arm-7", "--movements", "30", "--repeats", "0"]
     assert "30 movements, mean error" in go("-m", "sgimd_torch", "run", "--algorithm", "sgim-d", *short)
     go("-m", "sgimd_torch", "run", "--help")
 
-    telling = [word for word in words if len(word) > 4]  # short names such as "all" and "slow" are in many files
+    telling = [word for word in words if len(word) > 4]  # short names such as "all" are in many files
 
     def concerns(path):
         text = path.read_text(encoding="utf-8")
-        return any(name in text for name in (f"sgimd_torch.{room}", "experiments/", *telling))
+        return any(
+            name in text
+            for name in (f"sgimd_torch.{room}", "experiments/", "experiments.mis", "experiments.progress", *telling)
+        )
 
     tests = [
         str(path) for name in KEPT for path in (tmp_path / "tests" / name).rglob("test_*.py") if not concerns(path)

@@ -1,4 +1,4 @@
-"""The scripts: when setup installs, what demonstrators 1 and 2 show, and which options are refused."""
+"""The scripts: when setup installs, and which options are refused."""
 
 import os
 import shlex
@@ -11,16 +11,8 @@ import pytest
 
 import bench
 import check_physics
-import make_benchmark
 import make_demonstrations
-import make_teachers
-from sgimd_torch.algorithms.paper import random_exploration, sagg_riac, sgim_d
-from sgimd_torch.demonstrations import load_demonstrations
-from sgimd_torch.environments.fishing_rod import FishingRod
-from sgimd_torch.evaluation import load_benchmark, tile_goals
-from sgimd_torch.session import run
-from sgimd_torch.spaces import Box, stream
-from sgimd_torch.teachers import PeriodicTeacher
+import mutants
 
 
 def go(script, options):
@@ -33,20 +25,14 @@ def go(script, options):
 @pytest.mark.parametrize(
     ("script", "options"),
     [
-        *((make_benchmark, f"--{name} 0") for name in ("movements", "runs", "tiles", "processes")),
-        (make_benchmark, "--seed -1"),
-        (make_benchmark, "--runs 1.5"),
-        (make_benchmark, "--out nowhere/benchmark.npz"),
         (make_demonstrations, "--n -3"),
         (make_demonstrations, "--n 11 --candidates 10"),
         (make_demonstrations, "--n 10 --candidates 10"),  # some recordings land outside T
         (make_demonstrations, "--candidates 0"),
         (make_demonstrations, "--seed -1"),
         (make_demonstrations, "--out nowhere/demonstrations.npz"),
-        *((make_teachers, f"--{name} 0") for name in ("n", "runs", "movements", "processes")),
-        (make_teachers, "--seed -1"),
-        (make_teachers, "--out nowhere"),
-        (make_teachers, "--runs 1 --processes 1 --movements 5 --n 6"),  # too few movements
+        (mutants, "nowhere"),
+        (mutants, "--commit nowhere"),
         (check_physics, "--movements 0"),
         (bench, "--rounds 0"),
         (bench, "--movements 0"),
@@ -56,7 +42,7 @@ def go(script, options):
 )
 def test_what_makes_no_sense_is_refused_and_nothing_is_written(tmp_path, monkeypatch, capsys, script, options):
     monkeypatch.chdir(tmp_path)
-    out = {bench: "", check_physics: "", make_teachers: "--out . "}.get(script, "--out out.npz ")
+    out = {bench: "", check_physics: "", mutants: ""}.get(script, "--out out.npz ")
     with pytest.raises(SystemExit) as end:
         go(script, out + options)
     assert end.value.code == 2
@@ -64,97 +50,12 @@ def test_what_makes_no_sense_is_refused_and_nothing_is_written(tmp_path, monkeyp
     assert not list(tmp_path.iterdir())
 
 
-def lived(algorithm, seed, movements):
-    """The memory of a learner after its movements, without a run on disk."""
-    rod, teacher = FishingRod(threads=1), PeriodicTeacher(load_demonstrations(), stream(seed, "teacher"))
-    taught = {"correspondence": rod.primitive.correspondence} if algorithm is sgim_d else {}
-    learner = algorithm(rod, seed, **taught)
-    for _ in run(learner, rod, seed, movements=movements, teacher=teacher if taught else None):
-        pass
-    return learner.memory
-
-
-def test_the_benchmark_is_a_goal_in_each_tile_that_the_three_learners_reached(tmp_path):
-    go(make_benchmark, f"--out {tmp_path}/b.npz --runs 1 --movements 40 --seed 2007 --tiles 20")
-    outcomes = np.concatenate(
-        [lived(algorithm, 2007, 40).outcomes for algorithm in (random_exploration, sagg_riac, sgim_d)]
-    )
-    box = Box.cube(-1, 1, 2)
-
-    def goals(side):
-        return tile_goals(outcomes, box, side, stream(2007, "benchmark"))
-
-    side = min(np.linspace(0.05, 0.2, 301), key=lambda side: abs(len(goals(side)) - 20))
-    made = load_benchmark(tmp_path / "b.npz")
-    assert (made.environment, made.side) == ("FishingRod", side)
-    np.testing.assert_array_equal(made.goals, goals(side))
-    assert [path.name for path in tmp_path.iterdir()] == ["b.npz"]
-
-
-@pytest.fixture(scope="module")
-def pool():
-    """The exemplars with outcomes in T of two SAGG-RIAC learners after 30 movements each."""
-    memories = [lived(sagg_riac, seed, 30) for seed in (4000, 4001)]
-    thetas = np.concatenate([memory.thetas for memory in memories])
-    outcomes = np.concatenate([memory.outcomes for memory in memories])
-    inside = FishingRod().outcomes.contains(outcomes)
-    return thetas[inside], outcomes[inside]
-
-
-@pytest.fixture(scope="module")
-def teachers(tmp_path_factory):
-    """Demonstrations of demonstrators 1 and 2, made from the learners of ``pool``."""
-    out = tmp_path_factory.mktemp("teachers")
-    go(make_teachers, f"--out {out} --n 5 --runs 2 --movements 30 --processes 1")
-    assert sorted(path.name for path in out.iterdir()) == ["demonstrator_1.npz", "demonstrator_2.npz"]
-    return {number: load_demonstrations(out / f"demonstrator_{number}.npz", n_joints=6) for number in (1, 2)}
-
-
-def rows_of(demonstrations, thetas):
-    """Rows of ``thetas`` that the recordings show, by the correspondence of the learner."""
-    primitive = FishingRod().primitive
-    translated = np.stack([primitive.correspondence(lesson.times, lesson.trajectory) for lesson in demonstrations])
-    distances = np.abs(translated[:, None] - thetas).max(axis=2)
-    assert (distances.min(axis=1) < 1e-6).all()
-    return distances.argmin(axis=1)
-
-
-def test_the_naive_demonstrator_shows_what_it_remembers(pool, teachers):
-    thetas, outcomes = pool
-    rows = rows_of(teachers[1], thetas)
-    assert len(set(rows)) == 5
-    np.testing.assert_array_equal([lesson.outcome for lesson in teachers[1]], outcomes[rows])
-
-
-def test_the_careful_demonstrator_shows_one_movement_of_a_tile(pool, teachers):
-    thetas, outcomes = pool
-    rows = rows_of(teachers[2], thetas)
-    tiles = make_teachers.on_tiles(outcomes, 5)
-    assert sorted(np.concatenate(tiles)) == list(range(len(outcomes)))
-    chosen = [next(k for k, tile in enumerate(tiles) if row in tile) for row in rows]
-    assert len(set(chosen)) == 5
-    assert np.ptp(outcomes[rows], axis=0).min() > 0.5 * np.ptp(outcomes, axis=0).min()  # spread over the reached places
-
-
-def test_of_several_movements_the_one_that_lands_most_alike_is_the_most_reliable():
-    scattered, steady = [[0.0, 0.0], [1.0, 0.0], [0.2, 0.0]], [[0.0, 0.1], [0.0, 0.3], [0.0, 0.4]]
-    best, outcome = make_teachers.most_reliable(np.stack([scattered, steady], axis=1))
-    assert best == 1
-    np.testing.assert_array_equal(outcome, [0.0, 0.3])  # nearest the mean, 0.267
-
-
-def test_executed_again_without_noise_movements_land_where_they_did(pool):
-    rod = FishingRod(noise=0.0)
-    landed = make_teachers.execute_again(rod, pool[0][:2], stream(0, "test"))
-    assert landed.shape == (make_teachers.EXECUTIONS, 2, 2)
-    assert np.ptp(landed, axis=0).max() == 0
-    assert np.ptp(make_teachers.execute_again(FishingRod(), pool[0][:2], stream(0, "test")), axis=0).min() > 0
-
-
-def test_a_pool_on_too_few_tiles_is_refused(pool):
-    thetas, outcomes = pool
-    with pytest.raises(ValueError, match="only 1 tiles have a movement to show, too few for --n 3"):
-        make_teachers.careful(FishingRod(), thetas[[0, 0, 0]], outcomes[[0, 0, 0]], 3, stream(0, "test"))
+def test_each_mutant_has_one_place_in_the_library_and_tests_that_exist():
+    library, tests = bench.HERE / "sgimd_torch", bench.HERE / "tests"
+    for name, file, paths, right, wrong in mutants.mutants().values():
+        assert right != wrong
+        assert (library / file).read_text(encoding="utf-8").count(right) == 1, name
+        assert all((tests / path).exists() for path in paths.split()), name
 
 
 INTERPRETER = """#!/usr/bin/env bash

@@ -91,7 +91,7 @@ def rows(folder):
         return list(record.rows("events")), list(record.rows("errors"))
 
 
-@pytest.mark.parametrize("robot", ["planar-arm-7", "toss", "robots_at_once:Odd"])
+@pytest.mark.parametrize("robot", ["planar-arm-7", "experiments.toys:toss", "robots_at_once:Odd"])
 def test_a_run_that_was_stopped_goes_on_to_the_rows_of_a_whole_one(go, own, tmp_path, robot, capfd):
     place = "practice/seed-003"
     common = [*RUN, robot, *UNJUDGED]

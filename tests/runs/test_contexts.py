@@ -1,10 +1,7 @@
 """Runs where there are contexts: their evaluations draw them, and say the error by context."""
 
 import numpy as np
-import pytest
 
-from runs import content_of
-from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.evaluation import contexts_of_goals
 from sgimd_torch.options.build import task_of
 from sgimd_torch.options.command_line import main
@@ -15,7 +12,7 @@ from sgimd_torch.runs.tasks.taught import demonstrations_of
 
 
 def test_the_rod_in_the_wind_is_a_task():
-    config = Config("sgim-d", parts={"environment": "rod-wind", "environment.noise": 0.01})
+    config = Config("sgim-d", parts={"environment.max_wind": 0.05, "environment.noise": 0.01})
     robot = task_of(config).environment
     assert (robot.contexts.low.tolist(), robot.contexts.high.tolist()) == ([-0.05], [0.05])
     assert robot.noise == 0.01
@@ -25,21 +22,10 @@ def test_the_rod_in_the_wind_is_a_task():
     assert np.ptp(contexts) > 0.09
 
 
-def test_the_long_rod_is_a_task_without_context():
-    robot = task_of(Config(parts={"environment": "rod-long", "environment.noise": 0.01})).environment
-    assert (robot.noise, robot.contexts.dim) == (0.01, 0)
-    assert robot.model.body("line_07").mass == pytest.approx(1.5 * FishingRod().model.body("line_07").mass)
-
-
-def test_the_rod_in_the_wind_is_run_taught_and_resumed(tmp_path, benchmark):
-    words = "--algorithm sgim-d --environment rod-wind --movements 45 --evaluate-at 35 --repeats 2"
-    both = [*words.split(), "--benchmark", str(benchmark)]
-    assert command(main, [*both, "--out", str(tmp_path / "whole")]) == 0
-    assert command(main, [*both, "--out", str(tmp_path / "cut"), "--movements", "36"]) == 0
-    assert command(main, [*both, "--out", str(tmp_path / "cut"), "--resume"]) == 0
-    whole, cut = (tmp_path / name / "sgim-d/seed-000" for name in ("whole", "cut"))
-    assert content_of(whole) == content_of(cut)
-    run = read_run(whole)
+def test_the_rod_in_the_wind_is_run_and_taught(tmp_path, benchmark):
+    words = "--algorithm sgim-d --environment.max_wind 0.05 --movements 45 --evaluate-at 35 --repeats 2"
+    assert command(main, [*words.split(), "--benchmark", str(benchmark), "--out", str(tmp_path)]) == 0
+    run = read_run(tmp_path / "sgim-d/seed-000")
     assert run.contexts.shape == (45, 1)
     assert np.abs(run.contexts).max() <= 0.05
     assert (run.demonstration >= 0).any()

@@ -5,7 +5,7 @@ import os
 
 import pytest
 
-from runs import content_of, edit, settle
+from runs import content_of, edit, write_about
 from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.options.command_line import main
@@ -62,7 +62,13 @@ def other(tmp_path, past, how):
     path = tmp_path / "other.csv"
     match how:
         case "joints":
-            assert command(main, ["--environment", "toss", "--movements", "20", "--out", str(tmp_path / "toss")]) == 0
+            assert (
+                command(
+                    main,
+                    ["--environment", "experiments.toys:toss", "--movements", "20", "--out", str(tmp_path / "toss")],
+                )
+                == 0
+            )
             return tmp_path / "toss/practice/seed-000" / FILE, "of context, theta, outcome, this robot has"
         case "unit" | "bounds":
             path = tmp_path / FILE
@@ -71,7 +77,7 @@ def other(tmp_path, past, how):
             told = {name: [box.low.tolist(), box.high.tolist(), box.names, box.unit] for name, box in spaces.items()}
             told["outcomes"][3] = "mm" if how == "unit" else "m"
             told["policies"][1][2] += how == "bounds"
-            settle(tmp_path, spaces=told)
+            write_about(tmp_path, spaces=told)
             return path, "are in mm, here in m" if how == "unit" else "policies of"
         case "damaged":
             path = tmp_path / FILE

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from runs import edit, settle
+from runs import edit, write_about
 from sgimd_torch.algorithms.paper import random_exploration
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.learner.events import Event, Kind
@@ -42,7 +42,7 @@ def test_the_arrays_of_a_run_are_the_rows_of_its_record(reference, undisturbed):
     assert run.demonstration.tolist() == shown
     assert run.benchmark.tolist() == [[0.0, 0.6], [0.3, 0.5], [-0.4, 0.4]]
     assert {name: len(column) for name, column in run.errors.items() if name != "context"} == dict.fromkeys(
-        ("movements", "answer", "goal", "error", "noise", "failed", "expected"), 3 * 3
+        ("movements", "inverse", "goal", "error", "noise", "failed", "expected"), 3 * 3
     )
     assert run.robot == "FishingRod"
     assert run.spaces["outcomes"].low.tolist() == [-1, -1]
@@ -52,7 +52,7 @@ def test_a_column_of_an_evaluation_is_found_by_its_movements(run):
     found = read_run(run)
     assert found.at(5) == found.evaluation["mean_error"][0]
     assert found.at(8, "goals_met") == found.evaluation["goals_met"][1]
-    assert np.isnan([found.at(6), found.at(5, answer="model")]).all()
+    assert np.isnan([found.at(6), found.at(5, inverse="model")]).all()
     assert found.errors["error"][found.errors["movements"] == 5][: len(found.benchmark)].mean() == found.at(5)
 
 
@@ -105,12 +105,12 @@ def test_what_is_no_run_is_refused(tmp_path, run):
         find_runs(tmp_path / "csv")
     with pytest.raises(RunError, match="does not exist"):
         find_runs(tmp_path / "nowhere")
-    settle(run, settings={**read_run(run).config, "algorithm": "gone"})
+    write_about(run, settings={**read_run(run).config, "algorithm": "gone"})
     with pytest.raises(RunError, match="do not describe a run of this version"):
         config_of(read_run(run))
 
 
-@pytest.mark.parametrize("table", ["about", "events", "goals", "errors", "seals"])
+@pytest.mark.parametrize("table", ["about", "events", "goals", "errors"])
 def test_a_damaged_run_is_refused_whichever_table_it_is(run, table):
     edit(run / FILE, f"DELETE FROM {table} WHERE rowid = 2")
     with pytest.raises(RunError, match=r"run\.sqlite.*was it damaged or edited"):

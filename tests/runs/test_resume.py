@@ -1,5 +1,6 @@
 """Runs that are stopped, killed, damaged or made longer: in the end they are as if nothing had happened."""
 
+import re
 import shutil
 import signal
 import sqlite3
@@ -22,7 +23,6 @@ from runs import (
 )
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.inverses.locally_linear import LocallyLinear
-from sgimd_torch.learner.events import Kind
 from sgimd_torch.options.command_line import main
 from sgimd_torch.record import Record
 from sgimd_torch.runs import evaluations
@@ -32,16 +32,15 @@ from sgimd_torch.runs.read import movements_on_disk, read_run
 from sgimd_torch.runs.signals import command
 from sgimd_torch.spaces import stream
 
-LASTING = ("events", "demonstrations")
 # On the arm: a learner with regions, one that asks, one with a model; and one in contexts.
 ARM = "--environment planar-arm-7 --benchmark null --repeats 0 --evaluate_at 50"
 LEARNERS = {
     "rod": "",
     "rod, observing": "--algorithm observation",
     "arm": f"{ARM} --algorithm sagg-riac",
-    "asking": f"{ARM} --algorithm sgim-acts --teachers low-half,mislabelling",
+    "asking": f"{ARM} --algorithm sgim-acts --teachers low-half,high-half",
     "model": f"{ARM} --search gradient --inverse model --inverse.rate 0.5 --inverse.members 2 --evaluated-by own",
-    "contexts": f"{ARM} --environment toss --algorithm sgim-im --teachers all",
+    "contexts": f"{ARM} --environment experiments.toys:toss --algorithm sgim-im --teachers all",
 }
 
 
@@ -112,21 +111,6 @@ def test_a_run_that_another_process_writes_is_left_alone(tmp_path, go, benchmark
     assert content_of(tmp_path / "sgim-d" / "seed-003") == reference
 
 
-def test_a_run_made_longer_executes_nothing_again_for_its_evaluations(tmp_path, go, reference, monkeypatch, capsys):
-    assert go(tmp_path, "--movements", 50) == 0  # evaluated after 30 and, at its end, 50
-    evaluated = set()
-
-    def evaluate_and_note(*arguments, **options):
-        evaluated.add(arguments[4])
-        return evaluate(*arguments, **options)
-
-    monkeypatch.setattr(evaluations, "evaluate", evaluate_and_note)
-    assert go(tmp_path, "--resume") == 0
-    assert evaluated == {60, 90}
-    assert "evaluations after 50 movements are dropped" in capsys.readouterr().err
-    assert content_of(tmp_path / "sgim-d" / "seed-003") == reference
-
-
 @pytest.mark.parametrize(("algorithm", "end"), [("observation", 50), ("sgim-d", 60)])
 def test_a_finished_run_made_longer_equals_a_long_run(tmp_path, go, algorithm, end):
     """The long run is not evaluated after 50 movements; after 60 it is, but the noise is not measured there."""
@@ -139,37 +123,42 @@ def test_a_finished_run_made_longer_equals_a_long_run(tmp_path, go, algorithm, e
     assert read_run(extended).config["movements"] == MOVEMENTS
 
 
-def test_resuming_a_finished_run_changes_nothing_but_what_is_asked_of_its_evaluation(tmp_path, go, reference):
-    directory = tmp_path / "sgim-d" / "seed-003"
-    assert go(tmp_path) == go(tmp_path, "--resume") == 0
-    assert content_of(directory) == reference
-    assert go(tmp_path, "--resume", "--evaluate_at", "45", "--repeats", 3) == 0
-    assert read_run(directory).evaluation["movements"].tolist() == [45, 90]
-    assert go(tmp_path, "--resume", "--evaluate_at", "45,60", "--repeats", 3) == 0  # one more, between them
-    assert read_run(directory).evaluation["movements"].tolist() == [45, 60, 90]
-    assert go(tmp_path, "--resume") == 0
-    assert content_of(directory) == reference
+WHOLE = [(30, 0), (60, 0), (90, 2)]  # numbers of movements before each evaluation, and of its repeats
+WALKS = {  # options of each start of a run, and the evaluations for which it executes movements
+    "longer": [("--movements 50", [(30, 0), (50, 2)]), ("", [(60, 0), (90, 2)])],
+    "other moments": [
+        ("", WHOLE),
+        ("", []),
+        ("--evaluate_at 45 --repeats 3", [(45, 0), (90, 3)]),
+        ("--evaluate_at 45,60 --repeats 3", [(60, 0), (90, 3)]),
+        ("", WHOLE),
+    ],
+    "other floors": [
+        ("--movements 60 --floor_at 30,90", [(30, 2), (60, 0)]),
+        ("--floor_at 30,90", [(90, 2)]),
+        ("--floor_at 30,90", []),
+        ("--floor_at 90", WHOLE),
+        ("", WHOLE),  # null: only the end
+    ],
+}
 
 
-def test_a_resumed_run_keeps_its_evaluations_until_floor_at_changes(tmp_path, go, reference, monkeypatch):
+@pytest.mark.parametrize("walk", WALKS)
+def test_a_resumed_run_makes_only_the_evaluations_that_are_missing_or_asked_for(
+    tmp_path, go, reference, monkeypatch, walk
+):
     evaluated = []
 
     def evaluate_and_note(inverse, environment, goals, seed, movements, **options):
-        if not isinstance(inverse, LocallyLinear):  # the other answer, which never measures the noise
+        if not isinstance(inverse, LocallyLinear):  # the other inverse model, which never measures the noise
             evaluated.append((movements, options["repeats"]))
         return evaluate(inverse, environment, goals, seed, movements, **options)
 
     monkeypatch.setattr(evaluations, "evaluate", evaluate_and_note)
-    assert go(tmp_path, "--movements", 60, "--floor_at", "30,90") == 0
-    assert evaluated == [(30, 2), (60, 0)]
-    assert go(tmp_path, "--resume", "--floor_at", "30,90") == 0
-    assert evaluated == [(30, 2), (60, 0), (90, 2)]
-    assert go(tmp_path, "--resume", "--floor_at", "30,90") == 0
-    assert len(evaluated) == 3
-    assert go(tmp_path, "--resume", "--floor_at", "90") == 0
-    assert evaluated[3:] == [(30, 0), (60, 0), (90, 2)]
-    assert go(tmp_path, "--resume") == 0  # null: only the end
-    assert evaluated[6:] == [(30, 0), (60, 0), (90, 2)]
+    for k, (options, executed) in enumerate(WALKS[walk]):
+        assert go(tmp_path, *options.split(), *["--resume"] * (k > 0)) == 0
+        assert evaluated == executed
+        evaluated.clear()
     assert content_of(tmp_path / "sgim-d" / "seed-003") == reference
 
 
@@ -179,67 +168,32 @@ def copy(tmp_path, undisturbed):
     return shutil.copytree(undisturbed, tmp_path / "sgim-d" / "seed-003")
 
 
-def rows_of_movements(content):
-    """The row, from 1, of each movement among the events."""
-    return [row for row, (_, kind, *_) in enumerate(content["events"], 1) if kind in (Kind.MOVED, Kind.RESTED)]
-
-
 @pytest.mark.parametrize(
-    ("damage", "kept"),
+    ("damage", "message"),
     [
-        ("UPDATE events SET outcome_0 = 0.5 WHERE movement = 40 AND kind = 'moved'", 40),
-        ("DELETE FROM events WHERE movement = 40 AND kind = 'moved'", 40),
-        ("DELETE FROM events WHERE movement >= 70", 70),
-        ("DELETE FROM events", 0),
-        ("UPDATE events SET rowid = rowid + 1000 WHERE movement = 12", 12),
-        ("INSERT INTO events SELECT * FROM events WHERE movement = 89 AND kind = 'moved'", 90),
-        ("UPDATE demonstrations SET outcome_0 = 0.5 WHERE rowid = 2", 60),
-        ("DELETE FROM demonstrations", 30),
-        *((f"UPDATE {table} SET seal = 0 WHERE rowid = 1", 90) for table in ("goals", "evaluations", "errors")),
-        ("DELETE FROM regions WHERE rowid = 1", 90),
-        *((f"UPDATE about SET value = '[1]' WHERE name = '{name}'", 90) for name in ("run", "settings", "versions")),
+        ("UPDATE events SET outcome_0 = 0.5 WHERE movement = 40 AND kind = 'moved'", "of events is not what was"),
+        ("DELETE FROM events WHERE movement >= 70", "rows, .* were written"),
+        ("DELETE FROM demonstrations", "demonstrations has 0 rows"),
+        ("UPDATE errors SET error = 0 WHERE rowid = 1", "row 1 of errors"),
+        ("UPDATE about SET value = '[1]' WHERE name = 'settings'", "row 2 of about"),
+        (b"index,origin\n" * 300, "cannot be read as a record"),
+        (bytes(8192), "cannot be read as a record"),
     ],
 )
-def test_what_is_damaged_is_made_again_only_if_the_loss_is_accepted(
-    tmp_path, copy, go, reference, capsys, damage, kept
-):
-    edit(copy / FILE, damage)
+def test_a_damaged_run_is_refused_and_left_as_it_is(tmp_path, copy, go, capsys, damage, message):
+    (copy / FILE).write_bytes(damage) if isinstance(damage, bytes) else edit(copy / FILE, damage)
     before = files_of(copy)
     assert go(tmp_path, "--resume") == 2
-    message = capsys.readouterr().err
-    assert "Restore the record" in message
-    assert "--accept-loss" in message
+    said = capsys.readouterr().err
+    assert re.search(rf"{message}.*sqlite3 run.sqlite .recover saves what can be read", said)
+    assert "Traceback" not in said
     assert files_of(copy) == before
-    assert go(tmp_path, "--resume", "--accept-loss") == 0
-    assert f"{kept} movements of {copy / FILE} are kept" in capsys.readouterr().err
-    assert content_of(copy) == reference
-    assert files_of(copy).keys() == {FILE, "run.lost-0.sqlite"}
-    assert (copy / "run.lost-0.sqlite").read_bytes() == before[FILE]
-    assert go(tmp_path, "--resume") == 0  # nothing is missing any more
-
-
-@pytest.mark.parametrize("content", [b"index,origin\n" * 300, bytes(8192)])
-def test_a_file_of_which_nothing_can_be_read_is_refused_and_kept(tmp_path, copy, go, capsys, content):
-    (copy / FILE).write_bytes(content)
-    for options in ((), ("--accept-loss",)):
-        assert go(tmp_path, "--resume", *options) == 2
-        assert "cannot be read as a record" in capsys.readouterr().err
-    assert files_of(copy) == {FILE: content}
-
-
-def test_an_earlier_copy_of_a_damaged_record_is_not_overwritten(tmp_path, copy, go):
-    edit(copy / FILE, "DELETE FROM events WHERE movement >= 70")
-    (copy / "run.lost-0.sqlite").write_text("an earlier loss")
-    assert go(tmp_path, "--resume", "--accept-loss") == 0
-    assert (copy / "run.lost-0.sqlite").read_text() == "an earlier loss"
-    assert (copy / "run.lost-1.sqlite").exists()
 
 
 def rewritten(path, change):
     """Write a record anew, whole, with ``change(k, event)`` in the place of the k-th event."""
     with Record(path) as old:
-        about = {name: value for name, value in old.about.items() if name not in ("run", "dims")}
-        events, dims = list(old.events()), old.dims
+        about, events, dims = old.about, list(old.events()), old.dims
     path.unlink()
     with Record.make(path, dims, about) as new:
         for k, event in enumerate(events):
@@ -251,11 +205,11 @@ def rewritten(path, change):
 def test_a_replay_that_fails_says_where_and_leaves_the_file_as_it_was(
     tmp_path, copy, go, reference, capsys, name, value
 ):
-    row = next(row for row in rows_of_movements(reference) if reference["events"][row - 1][2] == "local")
-    movement = reference["events"][row - 1][0]
+    row = [origin for _, _, origin, *_ in reference["events"]].index("local")
+    movement = reference["events"][row][0]
 
     def change(k, event):
-        if k != row - 1:
+        if k != row:
             return event
         vector = getattr(event, name).copy()
         vector[0] = value
@@ -301,7 +255,11 @@ def test_a_full_disk_is_reported_and_the_run_can_go_on(tmp_path, go, benchmark, 
 def test_a_program_that_reads_the_record_all_the_time_stops_no_run(tmp_path, go, reference, monkeypatch, capsys):
     monkeypatch.setattr(run_module, "COMMIT_EVERY", 0.0)
     monkeypatch.setattr("sgimd_torch.record._IMPATIENCE", 0.0)
-    path, after, commit = tmp_path / "sgim-d" / "seed-003" / FILE, run_module.RunLoop._after, run_module.RunLoop._settle
+    path, after, commit = (
+        tmp_path / "sgim-d" / "seed-003" / FILE,
+        run_module.RunLoop._after,
+        run_module.RunLoop._try_commit,
+    )
     viewers, last = [], []
 
     def look(life, episode):
@@ -311,7 +269,7 @@ def test_a_program_that_reads_the_record_all_the_time_stops_no_run(tmp_path, go,
             viewers[0].execute("BEGIN")
             viewers[0].execute("SELECT * FROM events").fetchall()
 
-    def settle(life):
+    def committed(life):
         done = commit(life)
         last.append((life.movements, done))
         if last[-6:] == [(90, False)] * 6:
@@ -319,7 +277,7 @@ def test_a_program_that_reads_the_record_all_the_time_stops_no_run(tmp_path, go,
         return done
 
     monkeypatch.setattr(run_module.RunLoop, "_after", look)
-    monkeypatch.setattr(run_module.RunLoop, "_settle", settle)
+    monkeypatch.setattr(run_module.RunLoop, "_try_commit", committed)
     assert go(tmp_path) == 0
     assert "waiting until no other program reads" in capsys.readouterr().err
     assert content_of(path.parent) == reference

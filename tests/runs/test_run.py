@@ -14,10 +14,8 @@ from runs import ROOT, arguments, content_of
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
 from sgimd_torch.options.build import build
 from sgimd_torch.options.catalogue import WORDS
-from sgimd_torch.options.config import Config
 from sgimd_torch.runs import evaluations
 from sgimd_torch.runs.read import config_of, read_run
-from sgimd_torch.runs.run import RunLoop
 from sgimd_torch.runs.signals import Progress, Stopped, Stopping
 from sgimd_torch.spaces import Demonstration
 
@@ -32,7 +30,7 @@ def test_the_same_seed_makes_the_same_record_whatever_the_threads(tmp_path, go, 
 def answers_of(out, go, *options):
     assert go(out, *options) == 0
     (path,) = out.glob("*/seed-003")
-    return read_run(path).answers, content_of(path)["events"]
+    return read_run(path).evaluations, content_of(path)["events"]
 
 
 def test_what_a_run_learns_with_answers_once_for_both_of_its_names(tmp_path, go):
@@ -207,28 +205,10 @@ def test_small_matrices_get_one_thread_unless_the_user_chose(chosen, threads):
     assert said.split()[-1] == threads
 
 
-def test_the_time_of_evaluations_to_come_counts_their_movements(tmp_path):
-    evaluated = {"movements": 40, "evaluate_at": (10, 20), "evaluated_by": ("own",), "repeats": 3}
-    parts = build(
-        Config.from_settings({"algorithm": "random", "environment": "planar-arm-7", "out": tmp_path} | evaluated)
-    )
-    n = len(parts.benchmark.goals)
-    with RunLoop(parts, resume=False) as life:
-        episodes = life.episodes()
-        for movements, spent, later in (
-            (9, {"physics": 18.0}, 2.0 * 6 * n),
-            (10, {"evaluation": 0.5 * n}, 0.5 * 5 * n),
-        ):
-            while life.movements < movements:
-                next(episodes)
-            life.seconds._spent.update(spent)
-            assert life._later == pytest.approx(later)  # one movement for each goal, and at the end three more
-
-
 def test_the_time_that_is_left_counts_evaluations(monkeypatch, capsys):
     clock = [0.0]
     monkeypatch.setattr("sgimd_torch.runs.signals.time.monotonic", lambda: clock[0])
     with Progress("run", 100) as progress:
-        clock[0] = 60.0  # 50 movements in 50 s, and an evaluation of 10 s; two more are to come
-        progress.show(50, spent=10.0, later=20.0)
-    assert "50 of 100 movements, 1/s, 01:10 left" in capsys.readouterr().err
+        clock[0] = 60.0  # 50 movements in 50 s, and evaluations of 10 s
+        progress.show(50)
+    assert "50 of 100 movements, 0.833/s, 01:00 left" in capsys.readouterr().err

@@ -4,8 +4,6 @@ import os
 import subprocess
 import sys
 
-import pytest
-
 from runs import ROOT, about_of, content_of
 from sgimd_torch import PlanarArm
 from sgimd_torch.files import checksum
@@ -58,18 +56,14 @@ def test_a_robot_that_has_become_another_one_is_refused(own, capsys):
     assert "is this another robot?" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("what", ["sweep", "views.suite"])
-def test_processes_of_many_runs_find_the_working_directory(own, what):
+def test_processes_of_many_runs_find_the_working_directory(own):
     """Also where Python does not put it on the path by itself."""
     (own / "learners.py").write_text(
         "from sgimd_torch import random_exploration\n"
         "def mine(environment, seed): return random_exploration(environment, seed)\n"
     )
     program = "import sys; from sgimd_torch.__main__ import main; sys.exit(main())"
-    words = {
-        "sweep": "sweep --environment sliders:Slider3 --vary algorithm=learners:mine",
-        "views.suite": "suite --tasks crawler --algorithm learners:mine",
-    }[what]
+    words = "sweep --environment sliders:Slider3 --vary algorithm=learners:mine"
     done = subprocess.run(
         [sys.executable, "-c", program, *words.split(), *["--movements", "30", "--evaluate-at", "20", "--out", "runs"]],
         capture_output=True,

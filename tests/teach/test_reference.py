@@ -59,7 +59,7 @@ def test_a_run_with_lessons_makes_the_movements_that_it_always_made(seed, tmp_pa
 def test_a_resumed_run_with_lessons_ends_with_the_errors_that_it_always_had(seed, tmp_path, reference):
     found = lived(seed, 240, tmp_path, 130)
     check_movements(found, reference, f"by-hand {seed}")
-    for answer, table in found.answers.items():
-        kept = reference[f"by-hand {seed}/errors/{answer}"]
+    for inverse, table in found.evaluations.items():
+        kept = reference[f"by-hand {seed}/errors/{inverse}"]
         columns = [table[name] for name in ("movements", "mean_error", "median_error", "noise_floor")]
         np.testing.assert_allclose(np.stack(columns), kept, rtol=1e-9)

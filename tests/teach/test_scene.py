@@ -23,19 +23,23 @@ PUCK = {"context": "body:puck:x:.3:.4", "low": (-1.0, -0.6), "high": (0.4, 0.5)}
 
 
 @pytest.fixture
-def scene_of(tmp_path):
-    """Makes the scene of a robot; the model file is ARM."""
-    (tmp_path / "arm.xml").write_text(ARM)
+def server():
     with serving(8300, "secret") as server:
+        yield server
 
-        def make(robot, correspondence=None):
-            led = hand_led_of(Task(robot, correspondence=correspondence))
-            leading = Leading(led)
-            scene = Scene(server, led, leading.arm, robot.outcomes, robot.outcomes.low[None])
-            scene.draw_arm(leading.arm.data, leading.hand)
-            return scene
 
-        yield make, tmp_path / "arm.xml", server.scene
+def scene_of(server, robot, correspondence=None):
+    led = hand_led_of(Task(robot, correspondence=correspondence))
+    leading = Leading(led)
+    scene = Scene(server, led, leading.arm, robot.outcomes, robot.outcomes.low[None])
+    scene.draw_arm(leading.arm.data, leading.hand)
+    return scene
+
+
+@pytest.fixture
+def model(tmp_path):
+    (tmp_path / "arm.xml").write_text(ARM)
+    return tmp_path / "arm.xml"
 
 
 def corners(scene):
@@ -55,46 +59,42 @@ def corners(scene):
         ("site:tip", {"low": (-1, -0.6, 0), "high": (0.4, 0.5, 0.3)}, [-1, -0.6, 0], [0.4, 0.5, 0]),
     ],
 )
-def test_the_map_lies_where_outcomes_are(scene_of, outcome, options, low, high):
-    make, model, _ = scene_of
-    scene = make(MujocoRobot(model, outcome=outcome, **{**PUCK, **options}))
+def test_the_map_lies_where_outcomes_are(server, model, outcome, options, low, high):
+    scene = scene_of(server, MujocoRobot(model, outcome=outcome, **{**PUCK, **options}))
     assert corners(scene) == pytest.approx(np.array([low, high]), abs=1e-6)
     assert scene._goals.points[0] == pytest.approx(low, abs=0.01)
 
 
-def test_objects_are_drawn_where_they_begin_and_only_the_arm_can_be_dragged(scene_of):
-    make, model, _ = scene_of
-    scene = make(MujocoRobot(model, outcome="body:puck:xy", **PUCK))
+def test_a_strip_is_the_map_of_one_dimension(server, model):
+    scene = scene_of(server, MujocoRobot(model, outcome="site:tip:z", low=(0.0,), high=(0.5,)))
+    assert corners(scene)[:, 2] == pytest.approx([0, 0.5])
+    scene_of(server, PlanarArm())
+
+
+def test_objects_are_drawn_where_they_begin_and_only_the_arm_can_be_dragged(server, model):
+    scene = scene_of(server, MujocoRobot(model, outcome="body:puck:xy", **PUCK))
     assert scene._geoms.keys() == {1, 3, 4}  # neither the floor nor what a viewer of MuJoCo hides
     assert scene._geoms[4].position == pytest.approx([0.35, 0.3, 0.03])
     assert [name for name, _ in scene.grips] == ["tip", "upper", "fore"]
 
 
-def test_numbers_and_names_stand_at_the_edges_of_the_map(scene_of):
-    make, model, drawn = scene_of
-    labels, add = {}, drawn.add_label
+def test_numbers_and_names_stand_at_the_edges_of_the_map(server, model):
+    labels, add = {}, server.scene.add_label
 
-    def noting(name, text, *, position, **options):
+    def add_noted(name, text, *, position, **options):
         labels[text] = position
         return add(name, text, position=position, **options)
 
-    drawn.add_label = noting
-    make(MujocoRobot(model, outcome="body:puck:xy", **PUCK))
+    server.scene.add_label = add_noted
+    scene_of(server, MujocoRobot(model, outcome="body:puck:xy", **PUCK))
     assert labels.keys() == {"-1", "-0.5", "0", "0.5", "puck x (m)", "puck y (m)"}
     assert labels["-1"][0] == pytest.approx(-1)
     assert labels["0.5"][1] == pytest.approx(0.5)
 
 
-def test_the_line_of_the_rod_which_a_hand_does_not_move_is_not_drawn(scene_of):
-    make, _, _ = scene_of
+def test_the_line_of_the_rod_which_a_hand_does_not_move_is_not_drawn(server):
     rod = FishingRod(threads=1)
-    shown = {rod.model.body(rod.model.geom_bodyid[k]).name for k in make(rod, rod.primitive.correspondence)._geoms}
-    assert {"rod", "hand", "base"} <= shown
-    assert not any(name.startswith(("line", "float")) for name in shown)
-
-
-def test_a_strip_is_the_map_of_one_dimension(scene_of):
-    make, model, _ = scene_of
-    scene = make(MujocoRobot(model, outcome="site:tip:z", low=(0.0,), high=(0.5,)))
-    assert corners(scene)[:, 2] == pytest.approx([0, 0.5])
-    make(PlanarArm())
+    geoms = scene_of(server, rod, rod.primitive.correspondence)._geoms
+    bodies = {rod.model.body(rod.model.geom_bodyid[k]).name for k in geoms}
+    assert {"rod", "hand", "base"} <= bodies
+    assert not any(name.startswith(("line", "float")) for name in bodies)

@@ -15,21 +15,17 @@ from sgimd_torch.environments.fishing_rod import HOLD, FishingRod
 from sgimd_torch.environments.mujoco_robot import MujocoRobot
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.sketch import Sketch
-from sgimd_torch.evaluation import evaluate
 from sgimd_torch.options import command_line
-from sgimd_torch.options.build import build
 from sgimd_torch.record import Record
 from sgimd_torch.runs.directory import FILE
-from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.signals import command
 from sgimd_torch.spaces import Box, stream
 from sgimd_torch.views import check
 from sgimd_torch.views.film import command as film
 from sgimd_torch.views.film.camera import Camera
 from sgimd_torch.views.film.model_camera import viewing
-from sgimd_torch.views.film.panel import panel
 from sgimd_torch.views.film.reel import PAUSE, RATES, Shot, write_film
-from sgimd_torch.views.film.sketch import Sketchbook
+from sgimd_torch.views.film.sketch import Sketchbook, panel
 
 THETAS = stream(0, "film").random((100, 25))[40:]  # some reach the water before the line is let out
 RATE = RATES[".mp4"]
@@ -168,45 +164,6 @@ def test_an_interrupted_film_leaves_the_old_one_and_nothing_else(tmp_path):
     assert [path.read_text() for path in tmp_path.iterdir()] == ["old"]
 
 
-@pytest.mark.parametrize("algorithm", ["sgim-d", "observation"])
-def test_the_memory_rebuilt_from_the_log_judges_as_the_living_one_did(tmp_path, go, algorithm):
-    assert go(tmp_path, "--algorithm", algorithm, "--movements", 40, "--evaluate_at", "35", "--repeats", 0) == 0
-    run = read_run(tmp_path / algorithm / "seed-003")
-    parts = build(film.config_of(run))
-    assert (run.demonstration[:35] >= 0).any()
-    film.remember(run, parts, 0, 20)
-    film.remember(run, parts, 20, 35)  # in two steps, as a film of several stages does
-    seen = evaluate(parts.inverses["own"], parts.environment, parts.benchmark.goals, 3, 35, repeats=0)
-    assert seen.mean_error == run.evaluation["mean_error"][0]
-
-
-def test_a_forward_model_learns_again_what_it_learnt_in_the_run(tmp_path, go):
-    assert go(tmp_path, "--inverse", "model", "--movements", 80, "--evaluate_at", "[]") == 0
-    run = read_run(tmp_path / "sgim-d" / "seed-003")
-    parts = build(film.config_of(run))
-    film.remember(run, parts, 0, 60)
-    film.remember(run, parts, 60, 80)
-    assert run.refreshes["relative_error"][-1] == parts.learner.inverse.model.relative_error
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ("--goals 0.3,0.6 1,2,3", "--goals must have shape"),
-        ("--goals -0.3,far", "--goals: must be numbers with commas, got '-0.3,far'"),
-        ("--goals 0.3,0.6 -30,60", "outside"),
-        ("--after 20 41", "--after must be from 1 to 40"),
-        ("--out film.avi", "--out must be a .mp4 or .webp file"),
-        ("--out nowhere/film.mp4", "--out"),
-    ],
-)
-def test_what_cannot_be_filmed_is_refused_with_its_reason(run_path, capsys, options, message):
-    before = sorted(run_path.parent.iterdir())
-    assert command(film.main, [str(run_path), *options.split()]) == 2
-    assert message in capsys.readouterr().err
-    assert sorted(run_path.parent.iterdir()) == before
-
-
 def test_a_run_without_movements_is_refused(run_path, tmp_path, capsys):
     empty = tmp_path / run_path.name
     empty.mkdir()
@@ -342,7 +299,6 @@ def test_a_robot_from_a_file_is_filmed_in_space_and_without_opengl_in_the_plane(
         assert ((red > 150) & (green > 130) & (blue < 100)).sum() > 50  # the goal, yellow
     assert len(frames["egl"]) == len(frames["bogus"])
     assert np.abs(frames["egl"][0, :, :640] - frames["bogus"][0, :, :640]).mean() > 50
-    assert command(film.main, ["runs/random/seed-000", "--context", "0.5,0.1"]) == 2
 
 
 @pytest.mark.parametrize("own_camera", ["", "<camera name='far' pos='0 0 3' fovy='40'/>"])
@@ -407,24 +363,6 @@ def test_a_picture_of_ones_own_is_filmed_for_outcomes_of_any_dimension(own, caps
 def test_the_check_of_an_environment_looks_at_its_picture(own, capsys, word, code, message):
     assert command(check.main, [word]) == code
     assert message in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("word", "message"),
-    [
-        ("sliders:NoPicture", "sliders:NoPicture, which cannot be filmed: it needs a method trace("),
-        ("sliders:WrongPicture", "WrongPicture must give a Sketch with an outcome of 1 dimension, got list"),
-    ],
-)
-def test_what_has_no_picture_is_refused_in_a_line(own, capsys, word, message):
-    live(f"--environment {word} --algorithm random --movements 20 --evaluate-at [] --out runs --name one")
-    before = sorted(own.glob("runs/*/*"))
-    capsys.readouterr()
-    assert command(film.main, ["runs/one/seed-000", "--trust"]) == 2
-    said = capsys.readouterr().err
-    assert message in said
-    assert said.count("\n") == 1
-    assert sorted(own.glob("runs/*/*")) == before
 
 
 def test_code_that_somebody_elses_run_names_is_executed_only_with_trust(own, capsys, monkeypatch):

@@ -4,15 +4,11 @@ import itertools
 
 import numpy as np
 import pytest
-from scipy import stats
 
 from sgimd_torch.spaces import stream
 from sgimd_torch.views import statistics
 from sgimd_torch.views.statistics import (
     common_differences,
-    holm,
-    improvement,
-    improvement_interval,
     interquartile_mean,
     interval,
     iqm_interval,
@@ -65,54 +61,6 @@ def test_an_interval_holds_the_truth_about_as_often_as_it_says(rng, monkeypatch)
     assert 0.90 < share < 0.98  # .945 measured on 2000; its standard error here is .011
 
 
-def test_improvement_counts_pairs_and_a_tie_half():
-    assert improvement(np.array([1.0, 2.0]), np.array([2.0, 3.0])) == pytest.approx((1 + 1 + 0.5 + 1) / 4)
-
-
-def test_improvement_is_the_mann_whitney_statistic_and_its_opposite_makes_one(rng):
-    ours, theirs = rng.integers(0, 6, 9).astype(float), rng.integers(0, 6, 7).astype(float)
-    u = stats.mannwhitneyu(ours, theirs).statistic / 63  # how often ours are larger
-    assert improvement(ours, theirs) == pytest.approx(1 - u)
-    assert improvement(ours, theirs) + improvement(theirs, ours) == pytest.approx(1)
-    found, opposite = improvement_interval(ours, theirs), improvement_interval(theirs, ours)
-    assert 0 < found.low < found.value < found.high < 1
-    assert opposite == pytest.approx((1 - found.value, 1 - found.high, 1 - found.low))
-
-
-@pytest.mark.parametrize(("n", "low"), [(5, 0.643), (10, 0.80), (20, 0.90)])
-def test_few_seeds_never_make_an_improvement_certain(n, low):
-    ours, theirs = np.zeros(n), np.ones(n)
-    assert improvement_interval(ours, theirs) == pytest.approx((1, low, 1), abs=0.005)
-    assert improvement_interval(theirs, ours) == pytest.approx((0, 0, 1 - low), abs=0.005)
-    assert improvement_interval(ours, theirs, level=0.99).low < low
-
-
-def test_an_improvement_of_fewer_than_five_seeds_has_no_interval():
-    found = improvement_interval(np.zeros(4), np.ones(20))
-    assert found.value == 1
-    assert np.isnan(found.low)
-    assert np.isnan(found.high)
-
-
-@pytest.mark.parametrize(("n", "shift"), [(5, 0.0), (5, 2.0), (10, 1.0), (20, 2.0)])
-@pytest.mark.parametrize("level", [0.5, 0.8, 0.95])
-def test_an_interval_of_an_improvement_holds_the_truth_at_least_about_as_often_as_it_says(rng, n, shift, level):
-    truth = stats.norm.cdf(shift / np.sqrt(2))
-    pairs = [(rng.normal(size=n), rng.normal(shift, 1, n)) for _ in range(400)]
-    found = [improvement_interval(*pair, level=level) for pair in pairs]
-    share = np.mean([each.low <= truth <= each.high for each in found])
-    assert share > level - 0.1  # four standard errors at .5; five and nine at the others
-
-
-def test_holm_by_intervals_is_holm_by_p_values(rng):
-    """An interval at a level rejects where p is at most 1 - level."""
-    for p in rng.random((200, 6)) ** 4:
-        order = np.argsort(p)
-        adjusted = np.maximum.accumulate(p[order] * np.arange(6, 0, -1))
-        expected = set(order[adjusted <= 0.05].tolist())
-        assert holm(range(6), lambda claim, level, p=p: p[claim] <= 1 - level) == expected
-
-
 def test_noise_that_both_sides_of_a_pair_share_cancels(rng):
     noise = dict(enumerate(rng.normal(0, 5, 8)))
     np.testing.assert_allclose(common_differences({seed: each - 1 for seed, each in noise.items()}, noise), -1)
@@ -133,8 +81,6 @@ def test_pairs_are_matched_by_seed_not_by_place_and_others_are_left_out():
             r"got samples of \[3, 2\]",
         ),
         (lambda rng: interval(interquartile_mean, np.empty(0), rng=rng), "got 0"),
-        (lambda rng: improvement_interval(np.ones(1), np.ones(3)), r"2 or more seeds with finite errors, got \[1.0\]"),
-        (lambda rng: improvement_interval(np.ones(2), np.array([1, np.inf])), "finite errors"),
     ],
 )
 def test_what_cannot_be_computed_is_refused_with_its_reason(rng, refused, message):

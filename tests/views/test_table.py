@@ -16,17 +16,10 @@ from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.signals import command
 from sgimd_torch.views import variants
 from sgimd_torch.views.report import command as report
+from sgimd_torch.views.results import print_table
 from sgimd_torch.views.table import main
 
 SEEDS = 5
-
-
-def damage(path):
-    """Change some bytes in the middle of the largest file of a run."""
-    file = max(path.iterdir(), key=lambda each: each.stat().st_size)
-    content = bytearray(file.read_bytes())
-    content[len(content) // 2 : len(content) // 2 + 4] = b"junk"
-    file.write_bytes(content)
 
 
 FEW = "fewer than 5 seeds, too few for an interval: sgim-d (1)\n"
@@ -70,7 +63,7 @@ def test_numbers_are_interquartile_means_with_intervals_if_there_are_five_seeds_
     rows = rows_of(said.out)
     for head, column in (("error (m)", "mean_error"), ("median (m)", "median_error")):
         errors, few = (
-            np.array([read_run(path).answers["own"][column][-1] for path in sorted((runs / name).iterdir())])
+            np.array([read_run(path).evaluations["own"][column][-1] for path in sorted((runs / name).iterdir())])
             for name in ("random", "sgim-d")
         )
         middle = np.sort(errors)[1:-1].mean()  # of five seeds, the best and the worst are left out
@@ -87,24 +80,10 @@ def test_numbers_are_interquartile_means_with_intervals_if_there_are_five_seeds_
     assert head[1:] == list(rows["random"])[1:]
 
 
-def test_a_goal_missed_by_far_moves_the_mean_and_not_the_median(runs, monkeypatch, capsys):
-    read_whole = variants.read_run
-
-    def read(path):
-        run = read_whole(path)
-        own = run.answers["own"] | {"mean_error": np.full(2, 0.41), "median_error": np.full(2, 0.05)}
-        return replace(run, answers={**run.answers, "own": own})
-
-    monkeypatch.setattr(variants, "read_run", read)
-    assert table(runs / "sgim-d", "--at", 40) == 0
-    row = rows_of(capsys.readouterr().out)["sgim-d"]
-    assert (row["error (m)"], row["median (m)"]) == ("0.410", "0.050")
-
-
 def test_csv_has_all_digits_and_columns_of_the_ends_of_intervals(runs, capsys):
     assert table(runs, "--at", 40, "--format", "csv") == 0
     rows = {row["variant"]: row for row in csv.DictReader(io.StringIO(capsys.readouterr().out))}
-    found = variants.Variant("random", variants.read(runs)["random"], 40).last_error
+    found = variants.Variant("random", variants.read_runs(runs)["random"], 40).last_error
     cells = [rows["random"][f"error (m){end}"] for end in ("", " low", " high")]
     assert tuple(map(float, cells)) == found
     assert rows["sgim-d"]["error (m) low"] == ""
@@ -121,7 +100,7 @@ def test_latex_needs_no_package_and_no_sign_of_a_name_is_a_command(copied, capsy
     assert odd.count(" & ") == 9
     assert odd.endswith(r" \\")
     ours, theirs = (
-        read_run(copied / name / "seed-000").answers["own"]["mean_error"][-1] for name in ("a_b&50%", "random")
+        read_run(copied / name / "seed-000").evaluations["own"]["mean_error"][-1] for name in ("a_b&50%", "random")
     )
     assert f"{ours - theirs:+.4f}".replace("-", "$-$") in odd
 
@@ -155,7 +134,7 @@ def test_variants_are_compared_where_all_finished_runs_were_evaluated_the_last_t
     said = capsys.readouterr()
     assert rows_of(said.out)["random"]["movements"] == "20"
     assert len(said.out.splitlines()) == 4
-    error = read_run(copied / "longer/seed-000").answers["own"]["mean_error"][0]
+    error = read_run(copied / "longer/seed-000").evaluations["own"]["mean_error"][0]
     assert f"{error:.3f}" in next(line for line in said.out.splitlines() if line.startswith("longer"))
 
 
@@ -166,9 +145,9 @@ def test_an_unfinished_run_counts_where_it_was_evaluated_and_is_named_where_it_w
         run = read_whole(path)
         if path != cut:
             return run
-        own = {name: column[:1] for name, column in run.answers["own"].items()}
+        own = {name: column[:1] for name, column in run.evaluations["own"].items()}
         summary = {**run.summary, "finished": False}
-        return replace(run, index=run.index[:30], answers={**run.answers, "own": own}, summary=summary)
+        return replace(run, index=run.index[:30], evaluations={**run.evaluations, "own": own}, summary=summary)
 
     monkeypatch.setattr(variants, "read_run", read)
     for at, seeds in ((), "4"), (("--at", 20), "5"):
@@ -177,33 +156,6 @@ def test_an_unfinished_run_counts_where_it_was_evaluated_and_is_named_where_it_w
         assert next(line for line in said.out.splitlines() if line.startswith("random")).split()[1] == seeds
         left_out = f"left out: {cut} was not evaluated after 40 movements, it has 30 of 40"
         assert (left_out in said.err) == (seeds == "4")
-
-
-def test_runs_without_a_common_evaluation_need_at(copied, tiny, capsys):
-    options = "--algorithm random --name other --movements 50 --repeats 0 --evaluate_at 30"
-    assert live([*options.split(), "--benchmark", str(tiny), "--out", str(copied)]) == 0
-    assert table(copied) == 2
-    assert "never evaluated after the same number of movements; choose one with --at" in capsys.readouterr().err
-
-
-def test_runs_that_were_never_evaluated_have_no_errors_to_compare(tmp_path, capsys):
-    assert live(["--algorithm=random", "--movements=5", "--evaluate-at=[]", f"--out={tmp_path}"]) == 0
-    assert table(tmp_path, "--baseline", "random") == 2
-    assert "no finished run was evaluated; were they made with --evaluate-at '[]'?" in capsys.readouterr().err
-
-
-def test_a_run_that_is_too_short_is_named(runs, capsys):
-    assert table(runs, "--at", 5000) == 2
-    assert "seed-000 was not evaluated after 5000 movements" in capsys.readouterr().err
-
-
-def test_a_damaged_run_is_named_and_nothing_is_printed(copied, capsys):
-    path = copied / "random" / "seed-001"
-    damage(path)
-    assert table(copied) == 2
-    said = capsys.readouterr()
-    assert not said.out
-    assert str(path) in said.err
 
 
 def test_a_folder_without_a_run_is_named(copied, capsys):
@@ -234,15 +186,16 @@ def test_few_seeds_are_compared_with_the_baseline_by_their_differences_alone(run
     assert table(runs, "--at", 40, "--baseline", "random") == 0
     head, found = last_column(capsys.readouterr().out)
     ours, theirs = (
-        read_run(runs / name / "seed-000").answers["own"]["mean_error"][-1] for name in ("sgim-d", "random")
+        read_run(runs / name / "seed-000").evaluations["own"]["mean_error"][-1] for name in ("sgim-d", "random")
     )
     assert head == "minus random (m)"
     assert found == {"random": "-", "sgim-d": f"{ours - theirs:+.4f}"}  # of the only seed that both have
 
 
-def test_a_baseline_that_is_no_variant_is_refused_with_the_near_name(runs, capsys):
-    assert table(runs, "--at", 40, "--baseline", "randon") == 2
-    said = capsys.readouterr()
-    assert not said.out
-    assert "'randon'; did you mean random? Known are random, sgim-d" in said.err
-    assert said.err.count("\n") == 1
+def test_columns_are_as_wide_as_their_widest_cell_and_lines_end_with_text(capsys):
+    print_table([("task", "error (m)", "seeds"), ("planar-arm-50", "0.1", "3"), ("toss", "0.25", "")])
+    assert capsys.readouterr().out.splitlines() == [
+        "task           error (m)  seeds",
+        "planar-arm-50  0.1        3",
+        "toss           0.25",
+    ]

@@ -1,6 +1,6 @@
 """Tasks: a task is an environment with benchmark goals, demonstrations and a correspondence to translate them.
 
-The catalogue has the tasks of ``rods.py`` and ``robots.py``. A function of your own can return a task:
+``robots.py`` has the tasks of the catalogue. A function of your own can return a task:
     def make(): return Task(Toss(), benchmark=my_goals, demonstrations=Path("shown.npz"), correspondence=translate)
 """
 
@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -18,21 +18,12 @@ from sgimd_torch.environments.protocol import Environment, FromFiles, check_inst
 from sgimd_torch.evaluation import Benchmark, load_benchmark
 from sgimd_torch.files import checksum
 from sgimd_torch.learner import Correspondence
-from sgimd_torch.spaces import Array, Demonstration
+from sgimd_torch.spaces import Array, Box, Demonstration
 
 if TYPE_CHECKING:
-    from sgimd_torch.environments.sketch import Trace, Tracer
+    from sgimd_torch.environments.sketch import Tracer
 
-MOST_GOALS: Final = 500  # largest number of benchmark goals for a task that brings none
-
-
-@runtime_checkable
-class Drawn(Protocol):
-    """An environment whose movements can be filmed (optional)."""
-
-    def trace(self, context: Array, theta: Array, rng: np.random.Generator) -> Trace:
-        """The trajectory of a movement. Its outcome must equal that of ``execute`` with an equal random stream."""
-        ...
+MAX_GOALS: Final = 500  # largest number of benchmark goals for a task that brings none
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,24 +51,29 @@ class Task:
     @property
     def picture(self) -> Tracer | None:
         """The method ``trace`` of a `Drawn` environment, with checks of its result; None for other environments."""
-        from sgimd_torch.environments.sketch import traced  # only films need it
+        from sgimd_torch.environments.sketch import Drawn, traced  # only films need them
 
         robot = self.environment
         return partial(traced, robot, robot.trace) if isinstance(robot, Drawn) else None
 
 
+def grid_over(box: Box, counts: Sequence[int] | Array) -> Array:
+    """``(n, dim)`` centres of equal cells of a box, so many in each dimension."""
+    centres = [low + (np.arange(n) + 0.5) / n * side for low, side, n in zip(box.low, box.sides, counts, strict=True)]
+    return np.stack(np.meshgrid(*centres), axis=-1).reshape(-1, box.dim)
+
+
 def goals_all_over(environment: Environment) -> Benchmark:
-    """At most ``MOST_GOALS`` goals all over T: a grid in one or two dimensions, Sobol points in more."""
+    """At most ``MAX_GOALS`` goals all over T: a grid in one or two dimensions, Sobol points in more."""
     box = environment.outcomes
-    per_side = int(MOST_GOALS ** (1 / box.dim))
+    per_side = int(MAX_GOALS ** (1 / box.dim))
     if box.dim <= 2:
-        steps = (np.arange(per_side) + 0.5) / per_side
-        points = np.stack(np.meshgrid(*[steps] * box.dim), axis=-1).reshape(-1, box.dim)
+        goals = grid_over(box, [per_side] * box.dim)
     else:
         from scipy.stats import qmc  # slower to import than this whole library
 
-        points = qmc.Sobol(box.dim, scramble=False).random_base2(int(np.log2(MOST_GOALS)))[1:]
-    return Benchmark(type(environment).__name__, box.low + points * box.sides, float(box.sides.max()) / per_side)
+        goals = box.low + qmc.Sobol(box.dim, scramble=False).random_base2(int(np.log2(MAX_GOALS)))[1:] * box.sides
+    return Benchmark(type(environment).__name__, goals, float(box.sides.max()) / per_side)
 
 
 def benchmark_of(task: Task, file: Path | None) -> tuple[Benchmark, list[str], str | None]:

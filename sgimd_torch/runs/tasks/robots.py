@@ -1,22 +1,51 @@
-"""Arms and a swimmer as tasks. Benchmark goals and demonstrations do not depend on the seed of a run."""
+"""The robots of the catalogue as tasks. Benchmark goals and demonstrations do not depend on the seed of a run."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
+from sgimd_torch.demonstrations import SHIPPED as SHIPPED_DEMONSTRATIONS
+from sgimd_torch.demonstrations import load_demonstrations
+from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import SHIPPED as SHIPPED_BENCHMARK
 from sgimd_torch.evaluation import Benchmark, tile_goals
-from sgimd_torch.runs.tasks import Task
-from sgimd_torch.spaces import Array, Box, Demonstration, stream
+from sgimd_torch.options.signature import with_keywords_of
+from sgimd_torch.runs.tasks import Task, grid_over
+from sgimd_torch.spaces import Box, Demonstration, stream
 
-DATA: Final = SHIPPED_BENCHMARK.parent
 SIDE: Final = 0.1  # m, side of a benchmark tile; the disc of radius 1 m that an arm reaches has 311 goals
-SHOWN: Final = 127  # number of demonstrations, equal to that of the rod's demonstrators
-SAMPLES: Final = 5  # number of samples in the trajectory of an arm's demonstration
+N_DEMONSTRATIONS: Final = 127  # number of an arm's demonstrations, equal to that of the rod's demonstrators
+N_SAMPLES: Final = 5  # number of samples in the trajectory of an arm's demonstration
+
+
+@with_keywords_of(FishingRod, "noise", "max_wind")
+def fishing_rod(*, task_space: float = 1.0, threads: int = 1, **physics: Any) -> Task:
+    """Arm with a fishing rod, in MuJoCo: the paper's task.
+
+    Demonstrations and benchmark goals are those of the paper's rod without wind, in the context 0 of a rod in the wind.
+
+    Args:
+        task_space: half side (m) of T, a square; 100 in the paper's large-space experiment.
+        threads: number of threads of an evaluation; results do not depend on this number.
+
+    Raises:
+        ValueError: a number is out of its range.
+    """
+    if not task_space > 0:
+        raise ValueError(f"task_space must be above 0, got {task_space}; it is a length in metres")
+    space = Box.cube(-task_space, task_space, 2, names=("x", "y"), unit="m")
+    rod = FishingRod(outcomes=space, threads=threads, **physics)
+
+    def without_wind() -> list[Demonstration]:
+        return [replace(demonstration, context=np.zeros(rod.contexts.dim)) for demonstration in load_demonstrations()]
+
+    demonstrations = without_wind if rod.contexts.dim else SHIPPED_DEMONSTRATIONS
+    return Task(rod, SHIPPED_BENCHMARK, demonstrations, rod.primitive.correspondence)
 
 
 def planar_arm(*, n_joints: int) -> Task:
@@ -31,43 +60,21 @@ planar_arm_50 = partial(planar_arm, n_joints=50)
 """Planar arm with 50 joints, no noise."""
 
 
-def swimmer() -> Task:
-    """gymnasium's Swimmer-v5: three links and two motors; a demonstration is a sequence of torques."""
-    from sgimd_torch.environments.swimmer import Swimmer  # gymnasium is loaded only when it is needed
-
-    return Task(Swimmer(), DATA / "swimmer_benchmark.npz", DATA / "swimmer_demonstrations.npz")
-
-
-def half_reached() -> Task:
-    """Planar arm with 7 joints that reaches less than half of T."""
-    arm = PlanarArm(7, noise=0.02, outcomes=Box(np.array([-1.0, -1.0]), np.array([3.0, 1.0]), ("x", "y"), "m"))
-    return Task(arm, partial(arm_benchmark, arm))
-
-
 def arm_benchmark(arm: PlanarArm) -> Benchmark:
     """One random goal in each tile of T, if the arm can reach this goal; every run has the same goals."""
     box = arm.outcomes
-    goals = tile_goals(np.tile(_grid(box, SIDE), (2, 1)), box, SIDE, stream(0, "goals for an arm"))
+    centres = grid_over(box, np.rint(box.sides / SIDE).astype(int))
+    goals = tile_goals(np.tile(centres, (2, 1)), box, SIDE, stream(0, "goals for an arm"))
     return Benchmark(type(arm).__name__, goals[arm.reachable(goals)], SIDE)
 
 
 def arm_demonstrations(arm: PlanarArm) -> list[Demonstration]:
     """Movements from rest to outcomes spread evenly over the reachable disc; all joints but the first bend equally."""
-    shares = (np.arange(SHOWN) + 0.5) / SHOWN  # shares of the disc's area, which make a sunflower spiral
-    turns = np.pi * (3 - np.sqrt(5)) * np.arange(SHOWN)
-    ends = np.sqrt(shares)[:, None] * np.stack([np.cos(turns), np.sin(turns)], axis=1)
-    return [_led_to(arm, end) for end in ends]
-
-
-def _grid(box: Box, side: float) -> Array:
-    """``(n, dim)`` centres of tiles."""
-    middles = [np.arange(low + side / 2, high, side) for low, high in zip(box.low, box.high, strict=True)]
-    return np.stack(np.meshgrid(*middles), axis=-1).reshape(-1, box.dim)
-
-
-def _led_to(arm: PlanarArm, end: Array) -> Demonstration:
-    context = np.empty(0)
-    theta = arm.solve(context, end)
-    times = np.linspace(0.0, 1.0, SAMPLES)
-    outcome = arm.execute(context, theta, stream(0, "demonstrations by an arm"))
-    return Demonstration(context, times, np.outer(times, arm.angles(theta)), outcome)
+    shares = (np.arange(N_DEMONSTRATIONS) + 0.5) / N_DEMONSTRATIONS  # of the disc's area; they make a sunflower spiral
+    turns = np.pi * (3 - np.sqrt(5)) * np.arange(N_DEMONSTRATIONS)
+    no_context, times, demonstrations = np.empty(0), np.linspace(0.0, 1.0, N_SAMPLES), []
+    for end in np.sqrt(shares)[:, None] * np.stack([np.cos(turns), np.sin(turns)], axis=1):
+        theta = arm.solve(no_context, end)
+        outcome = arm.execute(no_context, theta, stream(0, "demonstrations by an arm"))
+        demonstrations.append(Demonstration(no_context, times, np.outer(times, arm.angles(theta)), outcome))
+    return demonstrations

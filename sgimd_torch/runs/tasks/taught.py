@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Final, Protocol, runtime_checkable
+from typing import Final
 
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.demonstrations.fit import misfit_of
-from sgimd_torch.environments.protocol import primitive_of
+from sgimd_torch.environments.protocol import Translating, primitive_of
 from sgimd_torch.files import checksum
 from sgimd_torch.learner import Correspondence
 from sgimd_torch.runs.tasks import Task
@@ -19,24 +19,6 @@ from sgimd_torch.spaces import Array, Demonstration
 
 FASTER: Final = 3.0  # ratio of durations, shortest movement to recording; a larger ratio means times in a wrong unit
 TOO_FAR: Final = 0.25  # share of a joint's range; a recording with a larger misfit is refused
-
-
-@runtime_checkable
-class Translating(Protocol):
-    """An environment that can translate demonstrations (optional)."""
-
-    def correspondence(self, times: Array, trajectory: Array) -> Array:
-        """theta_d ``(theta_dim,)``, eq. (6); ``times`` ``(n_times,)`` s, ``trajectory`` ``(n_times, n_joints)``."""
-        ...
-
-
-@runtime_checkable
-class Replaying(Protocol):
-    """An environment that can follow a recording sample by sample (optional)."""
-
-    def replay(self, times: Array, trajectory: Array) -> Array:
-        """``(outcome_dim,)``; ``times`` ``(n_times,)`` s from 0, ``trajectory`` ``(n_times, n_joints)``."""
-        ...
 
 
 def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstration], list[str], str | None]:
@@ -56,25 +38,25 @@ def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstra
             f"{type(robot).__name__} has no demonstrations, but this algorithm needs a teacher; give --demonstrations "
             "FILE, or choose an algorithm that learns alone: --algorithm practice"
         )
-    shown: Sequence[Demonstration]
-    crc32: str | None = None
     if isinstance(source, Path):
-        crc32 = checksum(source)
-        shown = load_demonstrations(source, outcome_dim=robot.outcomes.dim, context_dim=robot.contexts.dim)
-        for row, each in enumerate(shown):
+        crc32: str | None = checksum(source)
+        demonstrations: Sequence[Demonstration] = load_demonstrations(
+            source, outcome_dim=robot.outcomes.dim, context_dim=robot.contexts.dim
+        )
+        for row, demonstration in enumerate(demonstrations):
             try:
-                theta_of(task, each)
+                theta_of(task, demonstration)
             except ValueError as error:
                 raise ValueError(f"{source}: recording {row} cannot be translated: {error}") from error
     else:
-        shown = source()
-    notes = [f"{len(shown)} demonstrations"] if shown else []
-    outside = [row for row, each in enumerate(shown) if not robot.outcomes.contains(each.outcome)]
+        crc32, demonstrations = None, source()
+    notes = [f"{len(demonstrations)} demonstrations"] if demonstrations else []
+    outside = [row for row, shown in enumerate(demonstrations) if not robot.outcomes.contains(shown.outcome)]
     if outside:
         unit = robot.outcomes.unit or "the unit of T"
         more = f", as do {len(outside) - 1} more" if len(outside) > 1 else ""
         notes.append(f"recording {outside[0]} lands outside T{more}; were they not recorded in {unit}?")
-    return shown, notes, crc32
+    return demonstrations, notes, crc32
 
 
 def correspondence_of(task: Task) -> Correspondence:
@@ -93,7 +75,7 @@ def correspondence_of(task: Task) -> Correspondence:
     )
 
 
-def theta_of(task: Task, shown: Demonstration) -> Array:
+def theta_of(task: Task, demonstration: Demonstration) -> Array:
     """theta_d ``(theta_dim,)`` of a demonstration, eq. (6).
 
     Raises:
@@ -101,14 +83,14 @@ def theta_of(task: Task, shown: Demonstration) -> Array:
             robot comes near it.
     """
     robot, primitive = task.environment, primitive_of(task.environment)
-    shortest, ranges = primitive.durations[0], primitive.ranges
-    if (lasts := shown.times[-1] - shown.times[0]) < shortest / FASTER:
+    shortest, ranges, times = primitive.durations[0], primitive.ranges, demonstration.times
+    if (lasts := times[-1] - times[0]) < shortest / FASTER:
         raise ValueError(
             f"it lasts {lasts:g} s, movements at least {shortest:g} s; is it in milliseconds, or played too fast?"
         )
-    theta = correspondence_of(task)(shown.times, shown.trajectory)
+    theta = correspondence_of(task)(times, demonstration.trajectory)
     theta = robot.policies.check("theta_d of the correspondence", theta)
-    misfit = misfit_of(robot, theta, shown)
+    misfit = misfit_of(robot, theta, demonstration)
     if ranges is not None and misfit > TOO_FAR * ranges.sides.mean():
         raise ValueError(
             f"the nearest movement of the robot misses it by {misfit:.2f} (root mean square); is it in degrees, with "

@@ -1,8 +1,8 @@
 """Film what a run has learnt: the robot executes the movements that the inverse model of the run infers for goals.
 
-The memory is rebuilt from the record. The robot executes the movement inferred for each goal once, with motor noise, in
-one context. Goals are yellow, dots are past outcomes, and lines are paths. A panel shows the benchmark goals, coloured
-by error, and the curve of the mean error.
+The learner repeats its record. The robot executes the movement inferred for each goal once, with motor noise, in one
+context. Goals are yellow, dots are past outcomes, and lines are paths. A panel shows the benchmark goals, coloured by
+error, and the curve of the mean error.
 
 MuJoCo draws robots from model files, with the border of T, and the fishing rod, with circles of radius 0.5 m and 1 m
 around its base. If the float is still in the air after the movement, the line is let out and the float falls, as the
@@ -29,13 +29,12 @@ from tqdm import tqdm
 from sgimd_torch.environments.sketch import Sketch
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.figures.names import colour, label
-from sgimd_torch.options.build import RunParts, build
-from sgimd_torch.runs.read import Run, config_of, read_run
+from sgimd_torch.runs.load import OpenRun
+from sgimd_torch.runs.read import Run
 from sgimd_torch.runs.signals import parser_of, say
 from sgimd_torch.spaces import Array, stream
-from sgimd_torch.views.film.panel import panel
 from sgimd_torch.views.film.reel import RATES, Painter, Shot, shoot, write_film
-from sgimd_torch.views.film.sketch import Sketchbook
+from sgimd_torch.views.film.sketch import Sketchbook, panel
 
 EXAMPLES = """examples:
   sgimd film runs/sgim-d/seed-003                               six goals, into runs/sgim-d/seed-003.mp4
@@ -53,12 +52,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         ImportError: a library to draw with is missing.
     """
     options = _options(argv)
-    run = read_run(options.run)
-    parts = _parts(run, trust=options.trust)
+    run = _opened(options.run, trust=options.trust)
+    recorded, parts = run.recorded, run.parts
     if parts.task.picture is None:
         raise ValueError(
-            f"{run.path} is of {run.config['environment']}, which cannot be filmed: it needs a method trace(context, "
-            "theta, rng) -> Sketch"
+            f"{recorded.path} is of {recorded.config['environment']}, which cannot be filmed: it needs a method "
+            "trace(context, theta, rng) -> Sketch"
         )
     if options.goals is None:
         known = np.unique(parts.benchmark.goals, axis=0)
@@ -66,11 +65,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     else:
         hint = "a goal is a place in T, such as 0.3,0.6"
         goals = np.stack([parts.environment.outcomes.check("--goals", goal, hint) for goal in options.goals])
-    stages = _stages(run, options)
-    contexts = parts.environment.contexts
+    stages, contexts = _stages(recorded, options), parts.environment.contexts
     middle = (contexts.low + contexts.high) / 2
     context = contexts.check("--context", middle if options.context is None else options.context)
-    shots = _cast(run, parts, goals, context, stages)
+    shots, stages = _cast(run, goals, context, stages)
     with _painter(parts.environment, shots) as painter:
         rate = RATES[options.out.suffix]
         n = sum(len(shot.moments(rate)) for shot in shots)
@@ -78,15 +76,15 @@ def main(argv: Sequence[str] | None = None) -> int:
             options.out, tqdm(shoot(painter, shots, rate), "filming", n, unit=" frames", delay=1.0, disable=None)
         )
     amount, missed = parts.environment.outcomes.amount, np.reshape([shot.missed for shot in shots], (len(stages), -1))
-    for movements, each in zip(stages, missed, strict=True):
-        mean, most = amount(each.mean()), amount(each.max())
+    for movements, distances in zip(stages, missed, strict=True):
+        mean, most = amount(distances.mean()), amount(distances.max())
         print(f"after {movements} movements: mean distance to the goal {mean}, at most {most}")
     print(f"Film {options.out}")
     return 0
 
 
-def _parts(run: Run, *, trust: bool) -> RunParts:
-    """The parts of the run. MuJoCo chooses OpenGL when it is imported; if the choice fails, it is imported without."""
+def _opened(path: Path, *, trust: bool) -> OpenRun:
+    """The run. MuJoCo chooses OpenGL when it is imported; if the choice fails, it is imported without."""
     if sys.platform == "linux":
         os.environ.setdefault("MUJOCO_GL", "egl")  # works without a display
     asked = dict(os.environ)
@@ -96,7 +94,7 @@ def _parts(run: Run, *, trust: bool) -> RunParts:
         os.environ["MUJOCO_GL"] = "disable"
         importlib.import_module("mujoco")
         os.environ.update(asked)
-    return build(config_of(run, trust=trust))
+    return OpenRun(path, trust=trust)
 
 
 def _painter(robot: Any, shots: Sequence[Shot]) -> AbstractContextManager[Painter]:
@@ -115,56 +113,49 @@ def _painter(robot: Any, shots: Sequence[Shot]) -> AbstractContextManager[Painte
     return nullcontext(Sketchbook(robot.outcomes, shots))
 
 
-def _cast(run: Run, parts: RunParts, goals: Array, context: Array, stages: Sequence[int]) -> list[Shot]:
-    """The shots: the movement inferred for each goal in a context at each stage, with equal motor noise at all stages.
+def _cast(run: OpenRun, goals: Array, context: Array, stages: Sequence[int]) -> tuple[list[Shot], list[int]]:
+    """The shots, and the number of movements of the learner at each stage.
 
-    A stage is a number of movements of the learner. The panel beside a shot shows the errors of the benchmark goals at
-    this stage, and the curve of the mean error over all stages. If there is one stage, the curve has the evaluations of
-    the run.
+    At each stage there is a shot of the movement inferred for each goal in a context, with equal motor noise at all
+    stages. The panel beside it shows the errors of the benchmark goals at this stage, and the curve of the mean error
+    over all stages. If there is one stage, the curve has the evaluations of the run.
+
+    Args:
+        run: opened run; its learner repeats the record as far as needed.
+        goals: ``(n, outcome_dim)`` goals to film.
+        context: ``(context_dim,)`` context of all movements.
+        stages: numbers of movements; robots that move at once end the last movements together, so there may be more.
     """
-    picture = parts.task.picture
+    recorded, parts = run.recorded, run.parts
+    robot, picture, benchmark = parts.environment, parts.task.picture, parts.benchmark
     assert picture is not None
-    robot, seed = parts.environment, run.config["seed"]
+    config, seed = recorded.config, recorded.config["seed"]
     names = robot.contexts.names or [f"context {k}" for k in range(robot.contexts.dim)]
     seen = ", ".join(f"{name} {robot.contexts.amount(x)}" for name, x in zip(names, context, strict=True))
-    who = label(run.config["name"] or run.config["algorithm"])
-    shots, errors = list[Shot](), list[Array]()
-    for before, movements in zip((0, *stages), stages, strict=False):
-        remember(run, parts, before, movements)
+    who = label(config["name"] or config["algorithm"])
+    shots, reached, errors = list[Shot](), list[int](), list[Array]()
+    for stage in stages:
+        run.replay(stage)
+        inverse, movements = parts.learner.inverse, parts.learner.movements
         if not len(parts.learner.memory):
-            raise ValueError(f"{run.path} has an empty memory after {movements} movements, so it infers no movement")
-        past = run.outcomes[:movements]
+            raise ValueError(
+                f"{recorded.path} has an empty memory after {movements} movements, so it infers no movement"
+            )
+        past = recorded.outcomes[:movements]
         past = past[np.isfinite(past[:, 0])]
         title = f"{who}, seed {seed}, after {movements} movements" + f"\n{seen}" * bool(seen)
         for k, goal in enumerate(goals):
-            recording = picture(context, parts.inverses["own"](context, goal).theta, stream(seed, "film", k))
+            recording = picture(context, inverse(context, goal).theta, stream(seed, "film", k))
             shots.append(Shot(recording, goal, context, title, robot.outcomes.unit, past))
-        found = evaluate(
-            parts.inverses["own"], robot, parts.benchmark.goals, seed, movements, context=context, repeats=0
-        )
-        errors.append(found.errors)
-    curve = np.array(stages), np.array([each.mean() for each in errors])
-    if len(stages) == 1 and len(run.evaluation["movements"]):
-        curve = run.evaluation["movements"], run.evaluation["mean_error"]
-    ink, goals_there = colour(run.config["algorithm"]), parts.benchmark.goals
-    beside = [panel(robot.outcomes, goals_there, errors[k], at, curve, ink) for k, at in enumerate(stages)]
-    return [replace(shot, beside=beside[row // len(goals)]) for row, shot in enumerate(shots)]
-
-
-def remember(run: Run, parts: RunParts, start: int, stop: int) -> None:
-    """Add the exemplars of the movements from ``start`` to ``stop`` to the memory, and train the forward model."""
-    memory, correspondence = parts.learner.memory, parts.learner.correspondence
-    by_observation = (
-        parts.learner.social is not None and parts.learner.social.remembers
-    )  # only such learners remember demonstrations
-    for row in range(start, min(stop, len(run.index))):
-        if by_observation and correspondence is not None and run.demonstration[row] >= 0:
-            shown = run.demonstrations[run.demonstration[row]]
-            memory.add(shown.context, correspondence(shown.times, shown.trajectory), shown.outcome)
-        if np.isfinite(run.outcomes[row]).all():
-            memory.add(run.contexts[row], run.thetas[row], run.outcomes[row])
-        for model in parts.learner.problem.trained:
-            model.refresh(memory)
+        evaluation = evaluate(inverse, robot, benchmark.goals, seed, movements, context=context, repeats=0)
+        errors.append(evaluation.errors)
+        reached.append(movements)
+    curve = np.array(reached), np.array([errors_of_stage.mean() for errors_of_stage in errors])
+    if len(reached) == 1 and len(recorded.evaluation["movements"]):
+        curve = recorded.evaluation["movements"], recorded.evaluation["mean_error"]
+    ink = colour(config["algorithm"])
+    beside = [panel(robot.outcomes, benchmark.goals, errors[k], at, curve, ink) for k, at in enumerate(reached)]
+    return [replace(shot, beside=beside[row // len(goals)]) for row, shot in enumerate(shots)], reached
 
 
 def _stages(run: Run, options: argparse.Namespace) -> list[int]:

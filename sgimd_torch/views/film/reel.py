@@ -1,6 +1,6 @@
 """Common parts of all films: shots, frames, captions, and the file.
 
-``camera.py`` draws the rod, ``sketch.py`` robots in the plane, and ``panel.py`` the map and the curve beside the robot.
+``camera.py`` draws the rod, ``sketch.py`` robots in the plane, and the map and the curve beside each robot.
     write_film(Path("film.mp4"), shoot(camera, [Shot(recording, goal)]))
 
 Needs the extra ``film``.

@@ -1,28 +1,44 @@
-"""Films of robots in the plane: chains of links and objects from a ``Sketch``, drawn without OpenGL.
+"""What matplotlib draws in films: robots in the plane, and the panel beside each robot.
 
     write_film(Path("film.mp4"), shoot(Sketchbook(arm.outcomes, shots), shots))
-The goal is a ring, past outcomes are dots, the outcome is a cross, and lines are the paths of the chains' ends. The
-first two dimensions of an outcome are x and y of the picture; if an outcome has only one dimension, y is 0.
+    picture = panel(space, goals, errors, 500, (movements, mean_errors), colour)
+
+A ``Sketch`` has chains of links and objects, drawn without OpenGL. The goal is a ring, past outcomes are dots, the
+outcome is a cross, and lines are the paths of the chains' ends. The first two dimensions of an outcome are x and y of
+the picture; if an outcome has only one dimension, y is 0. Needs the extra ``film``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
+from dataclasses import replace
+from typing import Any, Final
 
 import numpy as np
+from matplotlib import rc_context
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from PIL import Image
 
 from sgimd_torch.environments.sketch import Sketch
-from sgimd_torch.figures.axes import goal_rings
-from sgimd_torch.spaces import Array, Box
-from sgimd_torch.views.film.panel import blank, pixels
-from sgimd_torch.views.film.reel import HEIGHT, WIDTH, Shot
+from sgimd_torch.figures.axes import goal_rings, limits, over_movements
+from sgimd_torch.figures.learning import misses
+from sgimd_torch.figures.save import STYLE
+from sgimd_torch.figures.sections import sections
+from sgimd_torch.spaces import Array, Box, rounded
+from sgimd_torch.views.film.reel import HEIGHT, WIDTH, Frame, Shot
 
 MARGINS: Final = (0.06, 0.11)  # margins as shares of the width and the height of the picture
-_PAPER, _FRAME, _LINK = "#f7f5f0", "#c9c4b8", "#2b3a4a"
-_PATH, _END, _OBJECT, _PAST = "#e08a55", "#d1341f", "#2f7f6f", "#9db4c8"
+DPI: Final = 100
+TEXT: Final[Any] = {"font.size": 8, "axes.titlesize": 9, "axes.titlelocation": "left"}  # style of the panel
+PAPER: Final = "#f7f5f0"  # colour of the background
+BORDER: Final = "#c9c4b8"  # colour of the border of T
+LINK: Final = "#2b3a4a"  # colour of the robot's links
+PATH: Final = "#e08a55"  # colour of the path of a chain's end
+END: Final = "#d1341f"  # colour of a chain's end, and of the outcome
+OBJECT: Final = "#2f7f6f"  # colour of an object
+PAST: Final = "#9db4c8"  # colour of past outcomes
 
 
 class Sketchbook:
@@ -45,7 +61,7 @@ class Sketchbook:
         room = np.array([WIDTH, HEIGHT]) * (1 - 2 * np.array(MARGINS))
         half = np.array([WIDTH, HEIGHT]) / (room / np.maximum(high - low, 1e-9)).min() / 2
         self._low, self._high = (low + high) / 2 - half, (low + high) / 2 + half
-        self._figure = blank(WIDTH, facecolor=_PAPER)
+        self._figure = blank(WIDTH, facecolor=PAPER)
         self._ax = self._figure.add_axes((0, 0, 1, 1))
 
     def frame(self, shot: Shot, time: float) -> Image.Image:
@@ -56,16 +72,16 @@ class Sketchbook:
         ax.set_axis_off()
         ax.set(xlim=(self._low[0], self._high[0]), ylim=(self._low[1], self._high[1]))
         if self._space.dim > 1:
-            ax.add_patch(Rectangle(self._space.low[:2], *self._space.sides[:2], fill=False, edgecolor=_FRAME))  # type: ignore[arg-type]
-        ax.plot(*in_picture(shot.past).T, "o", color=_PAST, ms=2, mec="none")
+            ax.add_patch(Rectangle(self._space.low[:2], *self._space.sides[:2], fill=False, edgecolor=BORDER))  # type: ignore[arg-type]
+        ax.plot(*in_picture(shot.past).T, "o", color=PAST, ms=2, mec="none")
         goal_rings(ax, in_picture(shot.goal[None]), 14)
         for chain in sketch.chains:
-            ax.plot(*chain[: last + 1, -1].T, color=_PATH, lw=1.5)
+            ax.plot(*chain[: last + 1, -1].T, color=PATH, lw=1.5)
         for chain in sketch.chains:
-            ax.plot(*chain[last].T, "o-", color=_LINK, mfc="white", lw=3.5, ms=4)
-            ax.plot(*chain[last, -1:].T, "o", color=_OBJECT if chain.shape[1] == 1 else _END, ms=7)
+            ax.plot(*chain[last].T, "o-", color=LINK, mfc="white", lw=3.5, ms=4)
+            ax.plot(*chain[last, -1:].T, "o", color=OBJECT if chain.shape[1] == 1 else END, ms=7)
         if time >= sketch.landed:
-            ax.plot(*in_picture(sketch.outcome[None]).T, "x", color=_END, ms=12, mew=2)
+            ax.plot(*in_picture(sketch.outcome[None]).T, "x", color=END, ms=12, mew=2)
         return Image.fromarray(pixels(self._figure))
 
     def note(self, shot: Shot, time: float) -> str:
@@ -81,3 +97,42 @@ def in_picture(points: Array) -> Array:
 def _sketch(shot: Shot) -> Sketch:
     assert isinstance(shot.recording, Sketch)
     return shot.recording
+
+
+def panel(space: Box, goals: Array, errors: Array, now: int, curve: tuple[Array, Array], colour: str) -> Frame:
+    """A map of the benchmark goals, in the first two dimensions of T, above the curve of the mean error.
+
+    Args:
+        space: T, with names and unit.
+        goals: ``(n, outcome_dim)`` goals of the benchmark.
+        errors: ``(n,)`` errors of these goals, in the unit of T.
+        now: number of movements of the learner.
+        curve: ``(m,)`` numbers of movements and ``(m,)`` mean errors; later points than ``now`` are left out.
+        colour: colour of the curve.
+    """
+    plane, near = limits(goals, space), rounded(float(np.ptp(goals, axis=0).max() or 1.0) / 50)
+    margin = plane.sides / 20
+    section = sections(replace(plane, low=plane.low - margin, high=plane.high + margin))[0]
+    with rc_context({**STYLE, **TEXT}):
+        figure = blank(0.75 * HEIGHT, layout="constrained")
+        above, below = figure.subplots(2, height_ratios=[2.2, 1])
+        misses(above, goals, errors, space, section, 6 * near)
+        above.set_title(f"{(errors <= near).sum()} of {len(errors)} met within {space.amount(near)}")
+        movements, means = curve
+        seen = movements <= now
+        below.plot(movements[seen], means[seen], "o-", color=colour, ms=4)
+        over_movements(below, space.in_unit("mean error"))
+        below.set(xlim=(0, 1.05 * float(movements.max())), ylim=(0, 1.1 * float(means.max()) or 1.0))
+        return pixels(figure)
+
+
+def blank(width: float, **options: Any) -> Figure:
+    """A figure with a width in pixels and the height of the film; ``options`` go to matplotlib."""
+    return Figure(figsize=(width / DPI, HEIGHT / DPI), dpi=DPI, **options)
+
+
+def pixels(figure: Figure) -> Frame:
+    """The drawing of a figure as a frame."""
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.draw()
+    return np.array(canvas.buffer_rgba())[..., :3]

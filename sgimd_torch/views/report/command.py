@@ -10,11 +10,16 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from sgimd_torch.evaluation import RECENT
 from sgimd_torch.files import write_text
 from sgimd_torch.record import RunError
 from sgimd_torch.runs.signals import parser_of
-from sgimd_torch.views.report.page import page
-from sgimd_torch.views.variants import Variant, best_first, read
+from sgimd_torch.views.report import figures, provenance
+from sgimd_torch.views.results import results
+from sgimd_torch.views.statistics import LEAST_SEEDS, Interval, show
+from sgimd_torch.views.variants import Variant, baseline_of, best_first, compare, read_runs, unit_of
 
 EXAMPLES = """examples:
   sgimd report runs/sgim-d/seed-003               one run, into runs/sgim-d/seed-003/report.html
@@ -35,7 +40,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     out = options.out or options.runs / "report.html"
     if options.out is not None and (out.is_dir() or not out.parent.is_dir()):  # before any work
         raise RunError(f"--out must be a file in a folder that exists, got {out}")
-    variants = best_first(Variant(name, runs) for name, runs in read(options.runs).items())
+    variants = best_first(Variant(name, runs) for name, runs in read_runs(options.runs).items())
     write_text(out, page(options.runs, variants, options.baseline))
     print(out)
     return 0
@@ -48,3 +53,45 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument("--out", type=Path, metavar="FILE", help="page to write (default: RUNS/report.html)")
     parser.add_argument("--baseline", metavar="NAME", help="variant to compare the others with, seed by seed")
     return parser
+
+
+def page(place: Path, variants: Sequence[Variant], baseline: str | None = None) -> str:
+    """The page as HTML: ``template.html.j2``, filled with figures and numbers of each variant; texts are escaped.
+
+    Args:
+        place: folder of the runs.
+        variants: variants in the order of the page, at least one.
+        baseline: name of the variant to compare the others with; None for the default of `baseline_of`.
+
+    Raises:
+        ValueError: ``baseline`` is no variant that was evaluated.
+    """
+    reference = baseline_of(variants, baseline)
+    runs = [run for variant in variants for run in variant.runs]
+    jinja = Environment(
+        loader=FileSystemLoader(Path(__file__).parent), autoescape=True, undefined=StrictUndefined, trim_blocks=True
+    )
+    jinja.filters |= {"interval": _interval}
+    html = jinja.get_template("template.html.j2").render(
+        place=place,
+        variants=variants,
+        single=runs[0] if len(runs) == 1 else None,
+        n_runs=len(runs),
+        warnings=list(provenance.warnings(variants)),
+        baseline=reference,
+        compared=compare(variants, reference),
+        colours=figures.colours_of(variants),
+        planes=figures.planes_of(variants),
+        results=results(variants),
+        recent=RECENT,
+        least_seeds=LEAST_SEEDS,
+        figures=figures,
+        provenance=provenance,
+        unit=unit_of(variants),
+    )
+    return html.encode(errors="backslashreplace").decode()  # a name may hold invalid characters
+
+
+def _interval(number: Interval | None, form: str = ".3f") -> str:
+    """``0.060 [0.058, 0.062]``, or a dash for None."""
+    return "–" if number is None else show(number, form)

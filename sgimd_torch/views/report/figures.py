@@ -20,6 +20,7 @@ from matplotlib.figure import Figure
 from sgimd_torch.figures.axes import LEGEND, alike, limits, over_movements
 from sgimd_torch.figures.learning import COLOURS, interest_map, landing_points, map_after
 from sgimd_torch.figures.learning import misses as draw_misses
+from sgimd_torch.figures.save import STYLE as FILE_STYLE
 from sgimd_torch.figures.sections import Section, of_regions, sections
 from sgimd_torch.runs.read import Run
 from sgimd_torch.spaces import Array, Box, rounded
@@ -33,13 +34,10 @@ MOST_CURVES: Final = 8  # largest number of curves in one figure
 WIDE: Final = 4.3  # inches, width of the axes of a map, without colour bar
 MARGIN: Final = 1.2  # inches, height above and below the axes
 STYLE: Final[Any] = {
+    **FILE_STYLE,
     "font.size": 11,
-    "text.parse_math": False,  # names of a user are no formulas
     "axes.titlesize": 11,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
     "axes.formatter.useoffset": False,
-    "lines.linewidth": 2,
     "legend.fontsize": 10,
 }
 # Colours for further variants of an algorithm, from Okabe & Ito and P. Tol; no algorithm of the paper has one of them.
@@ -68,10 +66,10 @@ def colours_of(variants: Sequence[Variant]) -> dict[str, str]:
     """
     ordered = sorted(variants, key=lambda variant: (variant.name != variant.algorithm, variant.name))
     firsts = {variant.algorithm: variant.name for variant in reversed(ordered)}
-    found = {name: COLOURS[algorithm] for algorithm, name in firsts.items() if algorithm in COLOURS}
-    free = [colour for colour in _FURTHER if colour not in found.values()]
-    others = [variant.name for variant in ordered if variant.name not in found]
-    return found | {name: free[k % len(free)] for k, name in enumerate(others)}
+    colour_of = {name: COLOURS[algorithm] for algorithm, name in firsts.items() if algorithm in COLOURS}
+    free = [colour for colour in _FURTHER if colour not in colour_of.values()]
+    others = [variant.name for variant in ordered if variant.name not in colour_of]
+    return colour_of | {name: free[k % len(free)] for k, name in enumerate(others)}
 
 
 def error_curves(figure: Figure, variants: Sequence[Variant], colours: Mapping[str, str]) -> None:
@@ -91,7 +89,7 @@ def error_curves(figure: Figure, variants: Sequence[Variant], colours: Mapping[s
             ax.fill_between(variant.evaluated, low, high, color=colour, alpha=0.2, linewidth=0)
         if n > 1 and len(variants) == 1:
             ax.plot(variant.evaluated, variant.errors.T, color=colour, linewidth=0.7, alpha=0.4)
-        label = f"{_plain(variant.label)} ({_seeds(n)})"
+        label = f"{_curve_name(variant.label)} ({_seeds(n)})"
         ax.plot(variant.evaluated, centre, "o-", color=colour, markersize=4.5, label=label)
         if len(variants) == 1:
             floor = variant.floors.mean(axis=0)
@@ -143,35 +141,35 @@ def figure_of_curves(variants: Sequence[Variant]) -> Figure:
 
 def planes_of(variants: Sequence[Variant]) -> dict[str, Box]:
     """The part of T that maps show, by environment; it contains the outcomes of all variants in this environment."""
-    found: dict[str, list[Array]] = {}
+    corners_of: dict[str, list[Array]] = {}
     for variant in variants:
         if len(variant.landed):
             box = limits(variant.landed, variant.space)
-            found.setdefault(variant.environment, []).extend([box.low, box.high])
+            corners_of.setdefault(variant.environment, []).extend([box.low, box.high])
     spaces = {variant.environment: variant.space for variant in variants}
     return {
         name: replace(spaces[name], low=np.min(corners, axis=0), high=np.max(corners, axis=0))
-        for name, corners in found.items()
+        for name, corners in corners_of.items()
     }
 
 
 @png
 def landing(figure: Figure, variant: Variant, plane: Box) -> None:
     """Outcomes of movements and of demonstrations on a part of T; points outside this part are marked at its edge."""
-    panels, shown = sections(plane), variant.demonstrated
+    panels, demonstrated = sections(plane), variant.demonstrated
     for ax, section in zip(_panels(figure, panels), panels, strict=True):
         sides = section.box.sides
         longest = float(sides[0] if section.is_strip or not alike(sides) else sides.max())
-        side, crosses = rounded(longest / TILES), shown if len(shown) else None
+        side, crosses = rounded(longest / TILES), demonstrated if len(demonstrated) else None
         landing_points(ax, variant.landed, plane, section, demonstrated=crosses, side=side)
 
 
 @png
 def misses(figure: Figure, variant: Variant, *, expected: bool = False) -> None:
     """Goals of the last evaluation, coloured by their errors, or in the same colours by those that were expected."""
-    goals, found, foreseen = variant.misses
-    panels, drawn = sections(variant.space), (foreseen, "expected error") if expected else (found, "error")
-    most = max(float(np.nanquantile([found, foreseen], 0.95)), 1e-12)
+    goals, errors, expected_errors = variant.misses
+    panels, drawn = sections(variant.space), (expected_errors, "expected error") if expected else (errors, "error")
+    most = max(float(np.nanquantile([errors, expected_errors], 0.95)), 1e-12)
     for ax, section in zip(_panels(figure, panels), panels, strict=True):
         draw_misses(ax, goals, drawn[0], variant.space, section, most, drawn[1])
 
@@ -191,14 +189,14 @@ def regions(figure: Figure, run: Run) -> None:
         interest_map(ax, lows, highs, interests, section, goals=run.chosen_goals()[-GOALS:])
 
 
-def _panels(figure: Figure, shown: Sequence[Section]) -> list[Axes]:
+def _panels(figure: Figure, maps: Sequence[Section]) -> list[Axes]:
     """Axes below each other, one for each section of T, each with the aspect ratio of its section."""
-    heights = [section.height(WIDE) for section in shown]
-    figure.set_size_inches(6, sum(heights) + MARGIN * len(shown))
-    return list(figure.subplots(len(shown), 1, squeeze=False, height_ratios=heights).flat)
+    heights = [section.height(WIDE) for section in maps]
+    figure.set_size_inches(6, sum(heights) + MARGIN * len(maps))
+    return list(figure.subplots(len(maps), 1, squeeze=False, height_ratios=heights).flat)
 
 
-def _plain(name: str) -> str:
+def _curve_name(name: str) -> str:
     """A name as a matplotlib label: shortened, and not hidden (by a leading _)."""
     short = name if len(name) <= 32 else f"{name[:30]}…"
     return f"{' ' * short.startswith('_')}{short}"

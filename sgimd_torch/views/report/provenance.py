@@ -1,6 +1,6 @@
 """Provenance of the runs of a report: warnings, differing settings, versions, and commands that repeat the runs.
 
-doubts(variants)    # ["1 run not finished: ..."];   commands(variant.runs)    # ["sgimd run --algorithm=sgim-d ..."]
+warnings(variants)    # ["1 run not finished: ..."];   commands(variant.runs)    # ["sgimd run --algorithm=sgim-d ..."]
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from typing import Final
 from sgimd_torch.runs.read import Run
 from sgimd_torch.runs.signals import printable
 from sgimd_torch.views.statistics import LEAST_SEEDS
-from sgimd_torch.views.variants import Variant, differing, shown
+from sgimd_torch.views.variants import Variant, differing, text_of
 
 AGAIN: Final = "runs/again"  # folder for the repeated runs
 
 
-def doubts(variants: Sequence[Variant]) -> Iterator[str]:
+def warnings(variants: Sequence[Variant]) -> Iterator[str]:
     """Warnings for a reader who wants to compare these runs, one sentence each."""
     every = [run for variant in variants for run in variant.runs]
     few = [f"{variant.label} ({len(variant.used)})" for variant in variants if 0 < len(variant.used) < LEAST_SEEDS]
@@ -46,13 +46,13 @@ def doubts(variants: Sequence[Variant]) -> Iterator[str]:
 
 def versions(variants: Sequence[Variant]) -> dict[str, dict[str, None]]:
     """Versions by name, the commit first; of a resumed run, also the versions before it was resumed."""
-    found: dict[str, dict[str, None]] = {"commit": {}}
+    values_of: dict[str, dict[str, None]] = {"commit": {}}
     for run in [run for variant in variants for run in variant.runs]:
         for made_by in (run.versions, *run.versions.get("before", ())):
             for name, value in made_by.items():
                 if name != "before":
-                    found.setdefault(name, {})[shown(value)] = None
-    return found
+                    values_of.setdefault(name, {})[text_of(value)] = None
+    return values_of
 
 
 def commands(runs: Sequence[Run]) -> list[str]:

@@ -1,21 +1,24 @@
-"""Gymnasium's Swimmer-v5: a swimmer of three links travels for 6 seconds.
+"""Gymnasium's Swimmer-v5 as a task: a swimmer of three links travels for 6 seconds.
 
 theta: amplitude, phase and offset of a sinusoid for each of the two joints, and their frequency. The outcome is the
 distance travelled (m), along x and y. The noise is a small random change of posture and speeds at the start.
-    swimmer = Swimmer(); outcome = swimmer.execute(np.zeros(0), theta, rng)
+    sgimd run --environment experiments.swimmer:swimmer          # in the root folder of the repository
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
 from sgimd_torch.environments.controllers import Sinusoids
 from sgimd_torch.environments.from_gymnasium import FromGymnasium, gymnasium
+from sgimd_torch.runs.tasks import Task
 from sgimd_torch.spaces import Array, Box
 
+DATA: Final = Path(__file__).with_name("data")
 STEPS: Final = 150  # number of actions of a movement, .04 s each
 FREQUENCIES: Final = (0.2, 2.0)  # lowest and highest (Hz)
 START: Final = 0.02  # largest random change of positions (m, rad) and speeds (m/s, rad/s) at the start
@@ -49,3 +52,8 @@ class Swimmer(FromGymnasium):
 def travelled(observations: Sequence[Any]) -> Array:
     """``(2,)`` m, distance along x and y from the first observation to the last; an observation begins with x and y."""
     return np.asarray(observations[-1][:2] - observations[0][:2], dtype=np.float64)
+
+
+def swimmer() -> Task:
+    """The swimmer with its shipped goals and demonstrations; a demonstration is a sequence of torques."""
+    return Task(Swimmer(), DATA / "swimmer_benchmark.npz", DATA / "swimmer_demonstrations.npz")

@@ -1,8 +1,9 @@
 """Effects: the exemplars whose movement had an effect, for robots most of whose movements have none.
 
-Our addition. A movement that misses an object does not move it. So the outcomes of all movements without an effect lie
-on one plateau: they depend on the context alone. RANSAC (Fischler & Bolles 1981) finds the plateau: of many affine maps
-of the context, each through a few random exemplars, it takes the one that fits most other exemplars.
+Our addition. A movement that misses an object does not move it. So all movements without an effect have outcomes that
+depend on the context alone: these outcomes lie on the *plateau*, an affine map of the context. RANSAC (Fischler &
+Bolles 1981) finds the plateau: of many affine maps of the context, each through a few random exemplars, it takes the
+one that fits most other exemplars.
     effects = Effects(memory, problem.outcome_noise); acted = effects()
 """
 
@@ -15,13 +16,16 @@ import numpy as np
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, stream
 
-_FIRST, _GROWTH = 16, 1.5  # number of exemplars at the first search for a plateau; its growth until the next search
-_GUESSES: Final = 50  # number of candidate maps, each through the least number of exemplars that determine a map
-_GUESSED_ON: Final = 300  # largest number of random exemplars on which the candidates are compared
-_REFINED: Final = 5  # number of least squares fits that refine the best map
-_NEAR, _WITHIN = 2.0, 4.0  # sd from a plateau: nearly all of its points lie within the first, all within the second
+_FIRST: Final = 16  # number of exemplars at the first search for a plateau
+_GROWTH: Final = 1.5  # factor by which the number of exemplars grows from one search to the next
+_CANDIDATES: Final = 50  # number of candidate maps, each through the least number of exemplars that determine a map
+_SAMPLED: Final = 300  # largest number of random exemplars on which the candidates are compared
+_REFITS: Final = 5  # number of least squares fits that refine the best map
+_NEAR: Final = 2.0  # distance from a plateau, in standard deviations, within which nearly all of its points lie
+_WITHIN: Final = 4.0  # distance from a plateau, in standard deviations, within which all of its points lie
 _ROUNDING: Final = 1e-9  # assumed noise if an environment has none, relative to the spread of outcomes
-_LEAST, _SHARE = 16, 0.1  # least number of exemplars on a plateau, and least share of all exemplars
+_LEAST_NUMBER: Final = 16  # least number of exemplars on a plateau
+_LEAST_SHARE: Final = 0.1  # least share of all exemplars on a plateau
 # Of the points within 4 sd of a plateau, at least this share must lie within 2 sd. Without a plateau, about half do.
 _DENSE: Final = 0.9
 
@@ -39,7 +43,7 @@ class Effects:
         self.noise = outcome_noise * np.sqrt(memory.outcome_dim)
         self._n_searched = 0  # number of exemplars at the last search for a plateau
         self._plateau: Array | None = None  # (1 + context_dim, outcome_dim)
-        self._seen = 0
+        self._seen = 0  # number of exemplars that `__call__` has sorted by their distance from the plateau
 
     def __call__(self) -> Memory | None:
         """Memory of the exemplars with an effect, perhaps empty; None if there is no plateau, because then every
@@ -65,26 +69,26 @@ class Effects:
         outcomes = self.memory.outcomes[:n]
         self._scale = max(self.noise, _ROUNDING * float(np.sqrt(outcomes.var(axis=0).sum())))
         rng = stream(n, "plateau")
-        drawn = rng.permutation(n)[:_GUESSED_ON]
-        guesses = [self._fit(rng.choice(drawn, 1 + self.memory.context_dim, replace=False)) for _ in range(_GUESSES)]
-        near = [self._distances(guess, drawn) <= _NEAR * self._scale for guess in guesses]
-        plateau = guesses[int(np.argmax([rows.sum() for rows in near]))]
-        for _ in range(_REFINED):
+        sampled = rng.permutation(n)[:_SAMPLED]
+        n_points = 1 + self.memory.context_dim
+        candidates = [self._fit(rng.choice(sampled, n_points, replace=False)) for _ in range(_CANDIDATES)]
+        fits = [(self._distances(candidate, sampled) <= _NEAR * self._scale).sum() for candidate in candidates]
+        plateau = candidates[int(np.argmax(fits))]
+        for _ in range(_REFITS):
             distances = self._distances(plateau, slice(n))
             within = distances <= _WITHIN * self._scale
             plateau = self._fit(np.flatnonzero(within))
-        on, close = within.sum(), (distances <= _NEAR * self._scale).sum()
-        return plateau if on >= max(_LEAST, _SHARE * n) and close >= _DENSE * on else None
+        n_within, n_near = within.sum(), (distances <= _NEAR * self._scale).sum()
+        is_plateau = n_within >= max(_LEAST_NUMBER, _LEAST_SHARE * n) and n_near >= _DENSE * n_within
+        return plateau if is_plateau else None
 
     def _fit(self, rows: np.ndarray) -> Array:
         """Affine map from contexts to outcomes, fitted to ``rows`` by least squares."""
-        found: Array = np.linalg.lstsq(self._inputs(rows), self.memory.outcomes[rows], rcond=None)[0]
-        return found
+        return np.asarray(np.linalg.lstsq(self._inputs(rows), self.memory.outcomes[rows], rcond=None)[0])
 
     def _distances(self, plateau: Array, rows: np.ndarray | slice) -> Array:
         """Distances ``(n,)`` of the outcomes in ``rows`` from the ``plateau``."""
-        found: Array = np.linalg.norm(self.memory.outcomes[rows] - self._inputs(rows) @ plateau, axis=1)
-        return found
+        return np.asarray(np.linalg.norm(self.memory.outcomes[rows] - self._inputs(rows) @ plateau, axis=1))
 
     def _inputs(self, rows: np.ndarray | slice) -> Array:
         contexts = self.memory.contexts[rows]

@@ -3,12 +3,11 @@
 import pytest
 
 from sgimd_torch.options.build import task_of
-from sgimd_torch.options.catalogue import WORDS
 from sgimd_torch.options.config import Config
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.signals import command
 from sgimd_torch.runs.tasks import goals_all_over
-from sgimd_torch.views.suite import RANDOM, TASKS, UNIFORM, _options, main, runs_of
+from suite import RANDOM, TASKS, UNIFORM, main, parsed_options, runs_of
 
 SHORT = ("--movements", "20", "--evaluate-at", "20", "--processes", "1")
 LEARNER = ("--goals", "uniform", "--search", "perturb", "--budget", "1")
@@ -20,12 +19,11 @@ def suite(*words):
 
 
 def configs_of(*words):
-    return runs_of(*_options(words))[0]
+    return runs_of(*parsed_options(words))
 
 
 def test_half_of_the_tasks_and_no_more_are_used_to_choose_defaults():
     assert sum(task.new for task in TASKS.values()) >= len(TASKS) // 2
-    assert all(task.options["environment"] in WORDS["environment"] for task in TASKS.values())
 
 
 @pytest.mark.parametrize("name", [name for name, task in TASKS.items() if task.quick])
@@ -41,7 +39,9 @@ def test_each_task_is_run_with_the_learner_and_with_the_two_that_it_has_to_beat(
     assert len({config.directory for config in configs}) == 2 * 2 * 3
     ours = [config for config in configs if config.variant == "practice"]
     assert {(config["environment"], config.values.get("environment.task_space"), config.seed) for config in ours} == {
-        (word, side, seed) for word, side in (("toss", None), ("fishing-rod", 100.0)) for seed in (3, 4)
+        (word, side, seed)
+        for word, side in (("experiments.toys:toss", None), ("fishing-rod", 100.0))
+        for seed in (3, 4)
     }
     assert {(config.variant, config.values.get("budget")) for config in configs} == {
         (RANDOM, None),
@@ -72,3 +72,21 @@ def test_a_suite_is_run_shown_and_gone_on_with(tmp_path, capsys):
     assert f"{out}/toss/practice/seed-001: 0 of 20 movements" in capsys.readouterr().out
     assert suite(*words, "--seeds", "0-1", "--shard", "1/2", "--dry-run") == 0
     assert capsys.readouterr().out == ""  # the first half of the list is seed 0
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("--environment toss", "--environment cannot be given here: each task has its own"),
+        ("--environment.task_space=2", "--environment cannot be given here"),
+        ("--vary environment=toss,crawler", "--environment cannot be given here"),
+        ("--tasks toss --vary seed=1,2", "--seed cannot be given here: use --seeds"),
+        ("--tasks tos", "invalid choice: 'tos'"),
+        ("--tasks crawler --algorithm imitation", "has no demonstrations"),
+    ],
+)
+def test_a_wrong_suite_is_refused_and_leaves_nothing(tmp_path, monkeypatch, capsys, words, message):
+    monkeypatch.chdir(tmp_path)
+    assert suite(*words.split()) == 2
+    assert message in capsys.readouterr().err
+    assert not [*tmp_path.iterdir()]

@@ -5,17 +5,14 @@ from functools import partial
 import numpy as np
 import pytest
 
+from experiments.toys import crawler, fetch, puck, toss, toy_benchmark, two_elbows
 from sgimd_torch.algorithms.practice import practice
-from sgimd_torch.environments.objects import fetch, puck
-from sgimd_torch.environments.toys import crawler, toss, two_elbows
 from sgimd_torch.evaluation import evaluate
-from sgimd_torch.explore.effects import Effects
-from sgimd_torch.explore.returning import Returning
-from sgimd_torch.explore.widening import Widening
 from sgimd_torch.inverses.among_effects import AmongEffects
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.memory import Memory
-from sgimd_torch.runs.tasks.toys import toy_benchmark
+from sgimd_torch.searches.effects import Effects
+from sgimd_torch.searches.explore import Returning, Widening
 from sgimd_torch.session import run
 from worlds import NO_CONTEXT, problem
 
@@ -54,7 +51,7 @@ def test_movements_that_had_an_effect_are_told_from_those_without_in_any_unit(no
 
 @pytest.mark.parametrize("make", [toss, two_elbows, crawler])
 def test_where_each_movement_has_its_own_effect_there_is_no_plateau(make):
-    robot = make()
+    robot = make().environment
     memory, whole = lived(robot, 0), lived(robot, 300)
     effects = Effects(memory, robot.outcome_noise)
     for exemplar in zip(whole.contexts, whole.thetas, whole.outcomes, strict=True):
@@ -64,7 +61,7 @@ def test_where_each_movement_has_its_own_effect_there_is_no_plateau(make):
 
 @pytest.mark.parametrize("make", [puck, fetch])
 def test_touches_of_an_object_are_found(make):
-    robot = make()
+    robot = make().environment
     memory = lived(robot, 1000)
     acted = Effects(memory, robot.outcome_noise)()
     moved = np.linalg.norm(memory.outcomes - (memory.contexts if robot.contexts.dim else robot.rest), axis=1) > 0.06
@@ -92,7 +89,7 @@ def test_the_answer_is_learnt_from_movements_with_an_effect():
 
 
 def test_without_a_plateau_the_answer_and_the_exploration_are_the_usual_ones():
-    robot = two_elbows()
+    robot = two_elbows().environment
     memory = lived(robot, 200)
     ours, theirs = (problem(robot, memory=memory, inverse=make) for make in (AmongEffects, LocalProcess))
     goal = np.array([0.3, 0.4])
@@ -130,7 +127,7 @@ def test_it_explores_less_when_there_are_effects_to_learn_from():
 
 
 def test_practice_learns_to_fetch_a_ball_that_it_would_not_have_found_around_the_middle():
-    robot, errors = fetch(), []
+    robot, errors = fetch().environment, []
     goals = toy_benchmark(robot, 0.1).goals[::4]
     for parts in ({}, {"inverse": LocalProcess, "explore": Widening}):
         learner = practice(robot, 1, **parts)
@@ -167,7 +164,7 @@ def test_it_varies_more_the_more_often_the_effect_persists():
 
 
 def test_exploration_begins_with_uniform_movements_or_in_the_middle():
-    robot = crawler()
+    robot = crawler().environment
     learner = practice(robot, 0)
     origins = [episode.move.origin for episode in run(learner, robot, 0, movements=120)]
     assert origins[:30] == ["global"] * 30

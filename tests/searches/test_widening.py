@@ -5,14 +5,13 @@ from functools import partial
 import numpy as np
 import pytest
 
+from experiments.toys import two_elbows
 from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.environments.fishing_rod import FishingRod
-from sgimd_torch.environments.toys import two_elbows
-from sgimd_torch.explore.returning import Returning
-from sgimd_torch.explore.widening import Widening
 from sgimd_torch.inverses.among_effects import AmongEffects
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.inverses.nearest import NearestNeighbour
+from sgimd_torch.searches.explore import Returning, Widening
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Box, Estimate
 from worlds import NO_CONTEXT, problem
@@ -60,7 +59,9 @@ def test_a_movement_that_was_never_made_says_nothing():
     assert live(partial(Oracle, error=0.0), told=False)[0].width.sd == 0.1
 
 
-@pytest.mark.parametrize(("make", "least", "most"), [(two_elbows, 0.25, 0.3), (FishingRod, 0.03, 0.25)])
+@pytest.mark.parametrize(
+    ("make", "least", "most"), [(lambda: two_elbows().environment, 0.25, 0.3), (FishingRod, 0.03, 0.25)]
+)
 def test_it_looks_wide_where_movements_are_alike_and_near_where_they_are_not(make, least, most):
     robot = make()
     learner = practice(robot, 0)
@@ -90,7 +91,7 @@ def test_where_nothing_happens_practice_looks_wider_until_something_does():
 
 
 def test_around_a_copied_movement_practice_looks_half_as_wide_as_it_explores():
-    babbling, known = practice(two_elbows(), 0).autonomous.wide, np.full((1, 3), 0.5)
+    babbling, known = practice(two_elbows().environment, 0).autonomous.wide, np.full((1, 3), 0.5)
     babbling.explore.width.sd = 0.06
     search = babbling.search(Estimate(known[0], known, np.zeros((1, 2))), np.zeros(2))
     executed = np.array([next(search), *(search.send(np.zeros(2)) for _ in range(1999))])
