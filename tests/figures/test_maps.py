@@ -16,7 +16,7 @@ from sgimd_torch.figures.learning import (
     landing_points,
     misses,
 )
-from sgimd_torch.figures.sections import of_regions, sections
+from sgimd_torch.figures.sections import sections, sections_of_regions
 from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.spaces import Box, stream
 from worlds import problem
@@ -146,7 +146,7 @@ def test_regions_are_cut_at_the_middle_of_what_is_not_shown():
     """C of 1 dimension, T of 3: four regions, cut in the context at .4 and in outcome 2 at .7."""
     lows = np.array([[0, 0, 0, 0], [0.4, 0, 0, 0], [0, 0, 0, 0.7], [0.4, 0, 0, 0.7]])
     highs = np.array([[0.4, 1, 1, 0.7], [1, 1, 1, 0.7], [0.4, 1, 1, 1], [1, 1, 1, 1]])
-    first, second = of_regions(lows, highs, Box.cube(0, 1, 3))
+    first, second = sections_of_regions(lows, highs, Box.cube(0, 1, 3))
     low, high, met = first.cut(lows, highs)
     assert met.tolist() == [False, True, False, False]
     assert (low.tolist(), high.tolist()) == ([[0.0, 0.0]], [[1.0, 1.0]])
@@ -155,7 +155,7 @@ def test_regions_are_cut_at_the_middle_of_what_is_not_shown():
     assert met.tolist() == [False, True, False, True]
     assert (low.tolist(), high.tolist()) == ([[0.0, 0.0], [0.0, 0.7]], [[1.0, 0.7], [1.0, 1.0]])
     assert second.cut_at(lows, highs) == "context 0 = 0.5, outcome 1 = 0.5"
-    (plane, *_) = of_regions(np.zeros((1, 7)), np.ones((1, 7)), Box.cube(0, 1, 6))
+    (plane, *_) = sections_of_regions(np.zeros((1, 7)), np.ones((1, 7)), Box.cube(0, 1, 6))
     assert plane.cut_at(np.zeros((1, 7)), np.ones((1, 7))) == "the middle of 5 others"
 
 
@@ -169,7 +169,7 @@ def test_the_regions_of_an_interest_map_tile_each_picture_and_have_their_interes
     lows, highs = (np.stack([getattr(region, end) for region in goals.regions]) for end in ("low", "high"))
     interests = np.array([region.interest() for region in goals.regions])
     assert len(lows) > 4
-    for section in of_regions(lows, highs, space):
+    for section in sections_of_regions(lows, highs, space):
         low, high, met = section.cut(lows, highs)
         drawn = interest_map(Figure().subplots(), lows, highs, interests, section, goals=goals.regions[0].goals)
         corners = np.stack([path.vertices for path in drawn.get_paths()])
