@@ -1,4 +1,4 @@
-"""Learners that ask: when, whom and for which goal; teachers who reply, also badly; a life that asked goes on."""
+"""Learners that ask: when, whom and for which goal; teachers who reply, also badly."""
 
 import sys
 from collections import Counter
@@ -7,21 +7,17 @@ import numpy as np
 import pytest
 
 from experiments.mislabelling import mislabelled
-from sgimd_torch.algorithms.paper import sagg_riac
 from sgimd_torch.asking.algorithms import SEARCHING, sgim_acts, sgim_im
 from sgimd_torch.asking.teachers import AnsweringTeacher, high_half, low_half
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.goals.uniform import UniformGoals
 from sgimd_torch.parts import Demonstrator, Strategy
-from sgimd_torch.record import ReplayError
-from sgimd_torch.record.saving import load_life, save_life
 from sgimd_torch.runs.tasks.robots import arm_demonstrations
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Demonstration, Lesson, Request, stream
-from worlds import NO_CONTEXT, demonstrate, demonstrations, last_posture
+from worlds import NO_CONTEXT, demonstrations, last_posture
 
 ARM = PlanarArm(4, noise=0.02)
-TURNED = PlanarArm(4, noise=0.02, context=True)
 SHOWN = demonstrations(PlanarArm(4))
 
 
@@ -100,43 +96,6 @@ def test_it_asks_both_teachers_for_goals_and_uses_the_answers_in_both_ways():
     assert Counter(e.move.origin == "imitate" for e in asked).keys() == {True, False}
     imitated = next(e for e in asked if e.move.origin == "imitate")
     assert np.array_equal(imitated.move.theta, imitated.demonstration.trajectory[-1])
-
-
-@pytest.mark.parametrize(("arm", "make"), [(ARM, acts), (TURNED, acts)], ids=["no context", "context"])
-def test_a_life_that_asked_goes_on_as_if_it_had_never_stopped_without_asking_again(arm, make, tmp_path):
-    context = np.zeros(arm.contexts.dim)
-    shown = [demonstrate(arm, each.outcome, context) for each in SHOWN]
-    teachers = halves(shown=shown, takes=3)
-    whole, episodes = make(arm, 1, teachers), []
-    for episode in run(whole, arm, 1, movements=140, teachers=teachers):
-        episodes.append(episode)
-        if episode.index in (0, 13, 40, 77, 99):
-            save_life(whole, tmp_path / f"{episode.index}.sqlite")
-    assert any(e.request for e in episodes[:78])
-    assert any(e.move is None for e in episodes)
-    for last in (0, 13, 40, 77, 99):
-        again = make(arm, 1, teachers)
-        load_life(again, tmp_path / f"{last}.sqlite")  # the teachers' answers are in the file
-        rest = live(again, teachers, 140, arm, 1)
-        assert lines(rest) == lines(episodes[last + 1 :])
-        assert again.memory.outcomes.tobytes() == whole.memory.outcomes.tobytes()
-
-
-def test_a_request_that_waits_for_its_answer_is_saved_too(tmp_path):
-    seed = next(seed for seed in range(1000, 1100) if acts(seed=seed).request(NO_CONTEXT))
-    robot = acts(seed=seed)
-    assert robot.request(NO_CONTEXT)
-    save_life(robot, tmp_path / "life.sqlite")
-    again = acts(seed=seed)
-    load_life(again, tmp_path / "life.sqlite")
-    assert again.request(NO_CONTEXT).goal.tolist() == robot.request(NO_CONTEXT).goal.tolist()
-    for each in (robot, again):
-        each.watch(SHOWN[3])
-    assert np.array_equal(robot.ask(NO_CONTEXT).theta, again.ask(NO_CONTEXT).theta)
-    robot.tell([0.1, 0.2])
-    save_life(robot, tmp_path / "life.sqlite")
-    with pytest.raises(ReplayError, match="before movement 0 the learner was shown a demonstration, now it takes none"):
-        load_life(sagg_riac(ARM, seed), tmp_path / "life.sqlite")
 
 
 def fails(context, goal, memory):
