@@ -44,12 +44,12 @@ LEGEND: Final[Mapping[str, str]] = {
 }
 
 
-def sentence(tag: str, unit: str) -> str:
+def meaning_of(tag: str, unit: str) -> str:
     """The meaning of a tag, with the ``unit`` of T; "" stands for no unit."""
     return in_unit(LEGEND.get(tag) or LEGEND[tag.partition("/")[0]], unit)
 
 
-def page(unit: str) -> str:
+def as_markdown(unit: str) -> str:
     """The meaning of all tags, in Markdown; a list, because TensorBoard would break the tags of a table."""
     lines = [f"- **{tag}{'' if '/' in tag else '/...'}** {meaning}" for tag, meaning in LEGEND.items()]
     return in_unit("Steps are movements.\n\n" + "\n".join(lines), unit)

@@ -21,7 +21,7 @@ from tensorboardX.proto.event_pb2 import Event, SessionLog
 from tensorboardX.proto.summary_pb2 import Summary
 
 from sgimd_torch.board.curves import Behaviour, of_evaluation, of_regions
-from sgimd_torch.board.legend import page, sentence
+from sgimd_torch.board.legend import as_markdown, meaning_of
 from sgimd_torch.board.pictures import draw
 from sgimd_torch.evaluation import Benchmark, Evaluation
 from sgimd_torch.spaces import Box, Episode
@@ -107,7 +107,7 @@ class BoardListener(EventFile):
         names, values, _ = summary.hparams(hparams_of(parts.config), {result: math.nan})  # the third marks the end
         self.add(0, names)
         self.add(0, values)
-        self.add(0, summary.text("about/legend", page(self._space.unit)))
+        self.add(0, summary.text("about/legend", as_markdown(self._space.unit)))
 
     def episode(self, episode: Episode, replayed: bool) -> None:
         """Count a movement; after every 50th movement the curves get a point. Replayed movements have no times."""
@@ -150,7 +150,7 @@ class BoardListener(EventFile):
         """Add a summary to TensorBoard's page ``plugin``; the first summary of a tag carries the tag's explanation."""
         if tag not in self._explained:
             self._explained.add(tag)
-            made.value[0].metadata.summary_description = sentence(tag, self._space.unit)
+            made.value[0].metadata.summary_description = meaning_of(tag, self._space.unit)
             made.value[0].metadata.plugin_data.plugin_name = plugin
         self.add(self._movements, made)
 
@@ -162,10 +162,10 @@ def hparams_of(config: Any) -> dict[str, bool | float | str]:
     name of the variant, such as "sgim-d,budget=5". So each run of a sweep has all options that the sweep varies.
     """
     varied = re.findall(r"(?:^|,)([\w.-]+)=", config.variant)
-    typed = {name.replace("_", "-"): value for name, value in config.settings.items()}
+    settings = {name.replace("_", "-"): value for name, value in config.settings.items()}
     chosen = ["algorithm", "environment", "seed", *(name.replace("_", "-") for name in dict(config.parts)), *varied]
     return {
         name: value if isinstance(value, bool | int | float | str) else json.dumps(value)
-        for name, value in typed.items()
+        for name, value in settings.items()
         if name in chosen
     }

@@ -20,6 +20,7 @@ from sgimd_torch.teach.led import HandLed
 STEP: Final = 0.01  # s, time from one posture of the arm to the next
 FOLLOW: Final = 15.0  # 1/s, rate at which the held point follows the hand; 5 / FOLLOW s after a jump it is nearly there
 DAMPING: Final = 0.1  # damping of the inverse, relative to the Jacobian; it slows joints near a stretched posture
+BRAKES: Final = 0.95  # share of the accelerations that brakes a joint before the end of its range; some is left over
 TOLERANCE: Final = 1e-9  # rad, largest violation of a limit in one step that the solver accepts
 TURN_OR_SLIDE: Final = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
 
@@ -123,7 +124,7 @@ class Arm:
         self._configuration = mink.Configuration(model, positions)
         self._acceleration_limit = _AccelerationLimit(np.eye(model.nv)[self._dofs], self.accelerations)
         # In a step a joint covers at most this share of the way to the end of its range, so it can brake in time.
-        share = STEP * float((self.accelerations / self.speeds).min())
+        share = BRAKES * STEP * float((self.accelerations / self.speeds).min())
         self._limits = [
             mink.ConfigurationLimit(model, gain=min(1.0, share)),
             mink.VelocityLimit(model, dict(zip(led.joints, self.speeds, strict=True))),

@@ -22,6 +22,11 @@ from sgimd_torch.runs.tasks.taught import correspondence_of
 from sgimd_torch.spaces import Array, Box
 
 
+def on_the_plane(points: Array) -> Array:
+    """Positions ``(n, 3)`` m of points of T whose first two dimensions are x and y; z is 0."""
+    return np.pad(points[:, :2], ((0, 0), (0, 3 - min(2, points.shape[1]))))
+
+
 @dataclass(frozen=True, eq=False)
 class HandLed:
     """A robot that a person can lead by the hand; `Arm` checks it.
@@ -39,8 +44,7 @@ class HandLed:
         positions: ``(nq,)`` positions of all joints at the start of movements, except for the led ones; None for the
             initial positions of the model.
         hidden: names of bodies that are not drawn.
-        place: function from points of T ``(n, outcome_dim)`` to positions in the world ``(n, 3)`` m; None if the first
-            two dimensions are x and y.
+        place: function from points of T ``(n, outcome_dim)`` to positions in the world ``(n, 3)`` m.
     """
 
     model: mujoco.MjModel
@@ -52,7 +56,7 @@ class HandLed:
     accelerations: Array | None = None
     positions: Array | None = None
     hidden: tuple[str, ...] = ()
-    place: Callable[[Array], Array] | None = None
+    place: Callable[[Array], Array] = on_the_plane
 
 
 @runtime_checkable
@@ -85,7 +89,7 @@ def hand_led_of(task: Task) -> HandLed:
             *(robot.model, robot.joints, robot.hand, robot.primitive.joints, robot.start),
             *robot.primitive.fastest(),
             positions=robot.positions(start),
-            place=(lambda points: robot.located(points, start)[:, 0]) if measured else None,
+            place=(lambda points: robot.located(points, start)[:, 0]) if measured else on_the_plane,
         )
     else:
         raise ValueError(

@@ -45,17 +45,18 @@ class Scene:
 
     def __init__(self, server: viser.ViserServer, led: HandLed, arm: Arm, outcomes: Box, goals: Array) -> None:
         self._scene, self._outcomes, self._led, self._model = server.scene, outcomes, led, led.model
-        low, high = outcomes.low, outcomes.high
-        origin = self._placed(low)
-        along, across = self._edges()
+        origin = self._placed(outcomes.low)
+        edges = self._placed(outcomes.low + np.diag(outcomes.sides)) - origin  # (outcome_dim, 3) m, of T in the world
+        along, across = edges[0], edges[min(1, outcomes.dim - 1)]
+        if outcomes.dim == 1 or not across.any():  # then the map is a strip
+            across = np.cross([0, -1, 0] if along[2] else [0, 0, 1], along) / 10
         self._up = np.cross(along, across) / np.linalg.norm(np.cross(along, across))
         self._up *= np.sign(self._up @ CAMERA)
         links = [arm.data.body(name).xpos for name in arm.links]
-        corners = np.stack(
-            [origin, origin + along, origin + across, origin + along + across, self._placed(high), *links]
-        )
+        plane = [origin, origin + along, origin + across, origin + along + across]
+        corners = np.stack([*plane, self._placed(outcomes.high), *links])
         self.size = float(np.ptp(corners, axis=0).max())
-        self._add_map(origin, along, across)
+        self._add_map(origin, along, across, edges)
         self._goals = self._points("/goals", self.ground(goals, 3), TOO_FAR, 0.006)
         self._latest = self._points("/latest", np.zeros((1, 3)), LEARNER, 0.01)
         names = [self._model.body(k).name for k in self._model.geom_bodyid]
@@ -122,30 +123,10 @@ class Scene:
     def _placed(self, points: Array) -> Array:
         """Positions ``(..., 3)`` m in the world of points ``(..., outcome_dim)`` of T."""
         rows = np.reshape(points, (-1, self._outcomes.dim))
-        if self._led.place is None:
-            placed = np.zeros((len(rows), 3))
-            placed[:, : min(2, self._outcomes.dim)] = rows[:, :2]
-        else:
-            placed = self._led.place(rows)
-        return placed.reshape(*np.shape(points)[:-1], 3)
+        return self._led.place(rows).reshape(*np.shape(points)[:-1], 3)
 
-    def _edge(self, k: int) -> Array:
-        """``(3,)`` m, the edge of T in dimension ``k`` in the world; zeros if the dimension has no direction there."""
-        if k >= self._outcomes.dim:
-            return np.zeros(3)
-        return self._placed(
-            self._outcomes.low + self._outcomes.sides * (np.arange(self._outcomes.dim) == k)
-        ) - self._placed(self._outcomes.low)
-
-    def _edges(self) -> tuple[Array, Array]:
-        """Edges of the map, ``(3,)`` m each. If T has one dimension, the map is a strip."""
-        along, across = self._edge(0), self._edge(1)
-        if not across.any():
-            across = np.cross([0, -1, 0] if along[2] else [0, 0, 1], along) / 10
-        return along, across
-
-    def _add_map(self, origin: Array, along: Array, across: Array) -> None:
-        """Add the map, with numbers and names at the edges of T that begin at ``origin``."""
+    def _add_map(self, origin: Array, along: Array, across: Array, edges: Array) -> None:
+        """Add the map, with numbers and names at the ``edges`` of T that begin at ``origin`` and have a direction."""
         width, height = float(np.linalg.norm(along)), float(np.linalg.norm(across))
         x, y = along / width, -across / height  # of the picture, whose first row is the upper one
         self.map = self._scene.add_image(
@@ -156,10 +137,8 @@ class Scene:
             wxyz=SO3.from_matrix(np.stack([x, y, np.cross(x, y)], axis=1)).wxyz,
             position=origin + (along + across) / 2,
         )
-        for k, outwards in enumerate((y, -x, y - x)[: self._outcomes.dim]):
-            edge, low, high = self._edge(k), self._outcomes.low[k], self._outcomes.high[k]
-            if not edge.any():
-                continue
+        for k in np.flatnonzero(edges[:3].any(axis=1)).tolist():
+            edge, low, high, outwards = edges[k], self._outcomes.low[k], self._outcomes.high[k], (y, -x, y - x)[k]
             beside = origin + 0.04 * self.size * outwards
             step = rounded((high - low) / NUMBERS)
             for value in step * np.arange(np.ceil(low / step), np.floor(high / step) + 1):

@@ -140,7 +140,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         task = task_of(parse([f"--environment={options.environment}", *of_robot])[0])
     elif of_robot:
         raise ValueError(f"{of_robot[0]} is no option of sgimd demonstrations import, or needs --environment")
-    recordings = read(options, primitive_of(task.environment).ranges if task else None)
+    recordings = read_recordings(options, primitive_of(task.environment).ranges if task else None)
     if task is not None:
         recordings = _on_robot(task, recordings, options.source)
     unusable, usable = ([rec for rec in recordings if bool(rec.fault) is faulty] for faulty in (True, False))
@@ -161,7 +161,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0
 
 
-def read(options: argparse.Namespace, ranges: Box | None) -> list[Recording]:
+def read_recordings(options: argparse.Namespace, ranges: Box | None) -> list[Recording]:
     """Read the recordings of a source of any format; ``ranges`` are those of the robot's joints, if they are known.
 
     Raises:

@@ -33,7 +33,7 @@ from sgimd_torch.runs.read import Run
 from sgimd_torch.runs.signals import parser_of, say
 from sgimd_torch.views.results import Column, print_csv, print_latex, print_table, results
 from sgimd_torch.views.statistics import LEAST_SEEDS
-from sgimd_torch.views.variants import Variant, baseline_of, best_first, compare, differing, read, unit_of
+from sgimd_torch.views.variants import Variant, baseline_of, best_first, compare, differing, read_runs, unit_of
 
 
 def parser() -> argparse.ArgumentParser:
@@ -55,7 +55,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         ValueError: there is nothing to show, or a run is damaged.
     """
     options = parser().parse_args(argv)
-    variant_runs = read(options.runs)
+    variant_runs = read_runs(options.runs)
     runs = [run for seeds in variant_runs.values() for run in seeds]
     evaluated = options.at or options.baseline or any(len(run.evaluation["movements"]) for run in runs)
     at = options.at or (_last_common([run for run in runs if run.summary["finished"]]) if evaluated else None)

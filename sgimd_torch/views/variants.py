@@ -1,6 +1,6 @@
 """Variants of a study: their statistics over seeds, and their comparison, for tables and reports.
 
-variants = best_first(Variant(name, runs) for name, runs in read(Path("study")).items())
+variants = best_first(Variant(name, runs) for name, runs in read_runs(Path("study")).items())
 chosen = baseline_of(variants, "random"); [(row.variant.label, row.verdict) for row in compare(variants, chosen)]
 """
 
@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from sgimd_torch.evaluation import RECENT
+from sgimd_torch.evaluation import RECENT, OwnGoals
 from sgimd_torch.figures.names import label
 from sgimd_torch.options.catalogue import unknown
 from sgimd_torch.runs.directory import FILE, PLACE
@@ -32,7 +32,7 @@ POINTS: Final = 40  # largest number of points of a curve of own goals
 USUAL: Final = "sgim-d"  # name of the default baseline
 
 
-def read(place: Path) -> dict[str, list[Run]]:
+def read_runs(place: Path) -> dict[str, list[Run]]:
     """All runs below a folder, by name of the variant, without their thetas; folders without a run are named.
 
     Raises:
@@ -142,20 +142,11 @@ class Variant:
         length = min(len(run.index) for run in self.runs)
         movements = np.unique(np.linspace(0, length, POINTS + 1).astype(np.int64))
         goals = [run.own_goals() for run in self.runs]
-        missed = [[own_goals.recent(until) for until in movements.tolist()] for own_goals in goals]
-        failed = [
-            [
-                float(run.failed[max(0, until - RECENT) : until].mean()) if until else np.nan
-                for until in movements.tolist()
-            ]
-            for run in self.runs
+        curves = [
+            [_own_after(run, own, until) for until in movements.tolist()]
+            for run, own in zip(self.runs, goals, strict=True)
         ]
-        met = [
-            [float((near <= run.tolerance).mean()) if len(near) else np.nan for near in row]
-            for run, row in zip(self.runs, missed, strict=True)
-        ]
-        medians = [[float(np.median(near)) if len(near) else np.nan for near in row] for row in missed]
-        return OwnCurve(movements, np.array(medians), np.array(met), np.array(failed))
+        return OwnCurve(movements, *np.array(curves, dtype=np.float64).transpose(2, 0, 1))
 
     @property
     def failed(self) -> Array:
@@ -255,6 +246,17 @@ class Comparison:
         if len(self.seeds) < LEAST_SEEDS:
             return f"fewer than {LEAST_SEEDS} common seeds"
         return "better" if self.difference.high < 0 else "worse" if self.difference.low > 0 else "not told apart"
+
+
+def _own_after(run: Run, goals: OwnGoals, until: int) -> tuple[float, float, float]:
+    """Median distance missed, share met and share failed of the last 50 before movement ``until``; NaN for none."""
+    missed, failed = goals.recent(until), run.failed[max(0, until - RECENT) : until]
+    median = float(np.median(missed)) if len(missed) else np.nan
+    return median, _share(missed <= run.tolerance), _share(failed)
+
+
+def _share(values: NDArray[np.bool_]) -> float:
+    return float(values.mean()) if len(values) else np.nan
 
 
 def baseline_of(variants: Sequence[Variant], name: str | None = None) -> Variant | None:

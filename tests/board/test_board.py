@@ -1,6 +1,5 @@
 """The board: what its curves count, what its file holds, and that a resumed run leaves one continuous board."""
 
-import signal
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +15,7 @@ from tensorboardX import summary
 
 from boards import board_of, curves_of, pictures_of
 from own import MODULE
-from runs import arguments, content_of, end, stopped_at
+from runs import content_of
 from sgimd_torch import InterestMap, stream
 from sgimd_torch.board import pictures
 from sgimd_torch.board.curves import Behaviour, branches, of_evaluation, of_regions
@@ -252,13 +251,6 @@ def assert_same_board(directory, whole):
     assert found == wanted
 
 
-def test_a_run_that_was_killed_and_resumed_has_the_board_of_one_that_never_was(tmp_path, go, benchmark, watched):
-    directory = tmp_path / "sgim-d" / "seed-003"
-    end(stopped_at(130, *arguments(tmp_path, benchmark), *OPTIONS), signal.SIGKILL)
-    assert go(tmp_path, *OPTIONS, "--resume") == 0
-    assert_same_board(directory, watched)
-
-
 def test_a_board_depends_only_on_the_last_request(tmp_path, go, watched):
     assert go(tmp_path, *OPTIONS, "--movements", 130, "--board", "false", "--evaluate_at", "60") == 0
     assert go(tmp_path, *OPTIONS, "--resume") == 0
@@ -298,35 +290,3 @@ def test_an_outcome_that_is_named_like_a_formula_has_pictures(own, module):
     words = "--environment formula:Slider2 --algorithm sagg-riac --movements 40 --evaluate-at [] --repeats 0"
     assert command(main, [*words.replace("[]", "20").split(), "--board", "true", "--out", "runs"]) == 0
     assert pictures_of(Path("runs/sagg-riac/seed-000")).keys() == {"map/error", "map/competence"}
-
-
-HALVES = '''
-import numpy as np
-from sgimd_torch import Goals, InterestMap
-
-class Halves(Goals):
-    """A user's goal model; a run knows only its two regions."""
-
-    regions = ()
-
-    def __init__(self, problem):
-        super().__init__(problem)
-        self._whole = InterestMap(problem)
-        (region,) = self._whole.regions
-        self.regions = region.split(0, 0.5)
-
-    def sample(self, context):
-        return self._whole.sample(context)
-
-    def add(self, context, goal, competence, strategy="autonomous", gain=0.0):
-        self.regions = [self.regions[0].extend(np.array(goal), competence, gain, strategy), self.regions[1]]
-'''
-
-
-def test_the_regions_of_any_goal_model_are_shown(own, module):
-    module("halves", HALVES)
-    directory = live_as("Slider2", "--goals", "halves:Halves")
-    curves = curves_of(directory)
-    assert curves["regions/count"] == {50: 2, 100: 2}
-    assert {"competence/R0", "interest/R"} < curves.keys()
-    assert "map/competence" in pictures_of(directory)

@@ -48,9 +48,10 @@ def site(tmp_path_factory):
     return out
 
 
-# What a browser fetches to show a page: attributes of elements but links of texts, and of heads that name a page.
+# Addresses that a browser fetches to show a page: those of all elements, except links to other pages.
 FETCHED = re.compile(
-    r'<(?!a )(?![^>]* rel="?(?:canonical|next|prev)\b)[^>]* (?:src|href|data|poster)="?((?:https?:)?//[^" >]*)'
+    r"""<(?!a\s)(?![^>]*\srel=["']?(?:canonical|next|prev)\b)"""
+    r"""[^>]*\s(?:src|href|data|poster)=["']?((?:https?:)?//[^"' >]*)"""
 )
 
 

@@ -50,6 +50,14 @@ def test_what_makes_no_sense_is_refused_and_nothing_is_written(tmp_path, monkeyp
     assert not list(tmp_path.iterdir())
 
 
+def test_each_mutant_has_one_place_in_the_library_and_tests_that_exist():
+    library, tests = bench.HERE / "sgimd_torch", bench.HERE / "tests"
+    for name, file, paths, right, wrong in mutants.mutants().values():
+        assert right != wrong
+        assert (library / file).read_text(encoding="utf-8").count(right) == 1, name
+        assert all((tests / path).exists() for path in paths.split()), name
+
+
 INTERPRETER = """#!/usr/bin/env bash
 # A fake Python: its venv is one file, and its pip takes 0.3 s and notes its arguments.
 case "$1 $2" in

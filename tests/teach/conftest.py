@@ -16,14 +16,14 @@ from sgimd_torch.teach.taught import TaughtRun
 SIZE = {"width": 1150, "height": 640}
 TOKEN = "a-token-that-nobody-guesses"
 LONG = 120_000  # ms, after which Playwright gives a browser up
-# Colours of a square of the scene, and which share of its pixels differ from earlier ones by more than so much.
-LOOK = """
-const make = HTMLCanvasElement.prototype.getContext;  // else a picture that was shown cannot be read any more
+# Colours of a square of the scene, and the share of its pixels that differ from earlier ones by more than a threshold.
+COLOURS = """
+const getContext = HTMLCanvasElement.prototype.getContext;  // without preserveDrawingBuffer pixels cannot be read
 HTMLCanvasElement.prototype.getContext = function (kind, options) {
-  return make.call(this, kind, kind.startsWith("webgl") ? {...options, preserveDrawingBuffer: true} : options);
+  return getContext.call(this, kind, kind.startsWith("webgl") ? {...options, preserveDrawingBuffer: true} : options);
 };
-window.look = (x, y, side) => {
-  const canvas = [...document.querySelectorAll("canvas")].find((each) => each.width);
+window.colours = (x, y, side) => {
+  const canvas = [...document.querySelectorAll("canvas")].find((element) => element.width);
   if (!canvas) return [];
   const box = canvas.getBoundingClientRect(), scale = canvas.width / canvas.clientWidth;
   const small = document.createElement("canvas");
@@ -32,12 +32,12 @@ window.look = (x, y, side) => {
   pen.drawImage(canvas, (x - box.x) * scale, (y - box.y) * scale, side * scale, side * scale, 0, 0, side, side);
   return [...pen.getImageData(0, 0, side, side).data];
 };
-window.changed = (x, y, side, before, by) => {
-  const now = look(x, y, side);
+window.changed = (x, y, side, before, threshold) => {
+  const after = colours(x, y, side);
   let n = 0;
-  for (let k = 0; k < now.length; k += 4)
-    n += [0, 1, 2].some((c) => Math.abs(now[k + c] - before[k + c]) > by);
-  return 4 * n / now.length;
+  for (let k = 0; k < after.length; k += 4)
+    n += [0, 1, 2].some((channel) => Math.abs(after[k + channel] - before[k + channel]) > threshold);
+  return 4 * n / after.length;
 };
 """
 
@@ -59,10 +59,10 @@ def open_tab(browser):
 @pytest.fixture
 def rod(tmp_path):
     """A served run on the fishing rod after its first movements."""
-    given = {"algorithm": "practice-taught", "teacher": "by-hand", "movements": 400, "evaluate_at": ()}
-    taught = TaughtRun(Config.from_settings({**given, "name": "taught", "out": tmp_path, "repeats": 0}))
-    taught.go_on(5)
-    with served(taught) as page:
+    settings = {"algorithm": "practice-taught", "teacher": "by-hand", "movements": 400, "evaluate_at": ()}
+    run = TaughtRun(Config.from_settings({**settings, "name": "taught", "out": tmp_path, "repeats": 0}))
+    run.go_on(5)
+    with served(run) as page:
         yield page
 
 
@@ -100,7 +100,7 @@ class Tab:
         self.page, before = page, set(page.server.get_clients())
         self.tab = browser.new_page(viewport=SIZE)
         self.tab.set_default_timeout(LONG)
-        self.tab.add_init_script(LOOK)
+        self.tab.add_init_script(COLOURS)
         self.tab.goto(page.address)
         self.tab.get_by_role("button", name="Record").wait_for()
         page.until(lambda: set(page.server.get_clients()) - before)
@@ -116,13 +116,13 @@ class Tab:
         self.until_changed(self.hand(), 60, [255] * 4 * 60 * 60, 10, 0.05)
 
     def colours(self, place, side):
-        """Of a square around a place on the screen."""
-        return self.tab.evaluate("(square) => look(...square)", _square(place, side))
+        """Colours of a square around a place on the screen."""
+        return self.tab.evaluate("(square) => colours(...square)", _square(place, side))
 
-    def until_changed(self, place, side, before, by, share):
-        """Wait until such a share of the colours there differs from ``before`` by more than ``by``."""
-        look = "([x, y, side, before, by, share]) => changed(x, y, side, before, by) > share"
-        self.tab.wait_for_function(look, arg=[*_square(place, side), before, by, share])
+    def until_changed(self, place, side, before, threshold, share):
+        """Wait until more than this ``share`` of the square's pixels differ from ``before`` by the ``threshold``."""
+        condition = "([x, y, side, before, threshold, share]) => changed(x, y, side, before, threshold) > share"
+        self.tab.wait_for_function(condition, arg=[*_square(place, side), before, threshold, share])
 
     def at(self, point):
         """Where on the screen a point ``(3,)`` of the scene is."""

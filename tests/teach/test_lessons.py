@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from sgimd_torch.algorithms.paper import observation
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
@@ -36,14 +38,12 @@ def recorded(led, target, seconds):
     return leading.end_recording()
 
 
-def swung(rod):
-    return recorded(rod_led(rod), [0.4, 0.3, 0.6], 1.0)
-
-
-def test_the_file_gives_the_theta_that_the_learner_was_shown_bit_for_bit(rod, tmp_path):
-    lesson = give(rod, *swung(rod))
-    save_demonstrations(tmp_path / "mine.npz", [lesson.demonstration])
-    (loaded,) = load_demonstrations(tmp_path / "mine.npz", n_joints=6, outcome_dim=2, context_dim=0)
+@settings(max_examples=10, deadline=None, derandomize=True)
+@given(st.tuples(*[st.floats(-1, 1)] * 3), st.floats(0.5, 3.0))
+def test_the_file_gives_the_theta_that_the_learner_was_shown_bit_for_bit(rod, tmp_path_factory, target, seconds):
+    lesson, path = give(rod, *recorded(rod_led(rod), target, seconds)), tmp_path_factory.getbasetemp() / "mine.npz"
+    save_demonstrations(path, [lesson.demonstration])
+    (loaded,) = load_demonstrations(path, n_joints=6, outcome_dim=2, context_dim=0)
     translated = rod.primitive.correspondence(loaded.times, loaded.trajectory)
     np.testing.assert_array_equal(translated, lesson.theta_d)
     learner = observation(rod, 0, correspondence=rod.primitive.correspondence)
@@ -67,7 +67,7 @@ def test_what_the_robot_can_play_has_no_misfit_and_no_remark(rod):
 
 
 def test_a_slow_hand_is_played_in_the_longest_movement_and_told(rod):
-    times, joints = swung(rod)
+    times, joints = recorded(rod_led(rod), [0.4, 0.3, 0.6], 1.0)
     lesson = give(rod, times * 3.2, joints)
     assert lesson.demonstration.times[-1] == 1.6
     assert lesson.theta_d[-1] == 1.0

@@ -36,13 +36,6 @@ def table_of(file):
         return list(csv.DictReader(lines))
 
 
-def test_a_loaded_learner_answers_and_goes_on_as_the_one_that_made_the_run(path, lived):
-    loaded = load_learner(path)
-    goal = [0.3, 0.4]
-    np.testing.assert_array_equal(loaded.inverse(np.zeros(0), goal).theta, lived.inverse(np.zeros(0), goal).theta)
-    assert loaded.movements == 60
-
-
 def test_a_goal_is_answered_in_a_line_and_executed_if_wanted(path, lived, capsys):
     assert command(main, [str(path), "--goal", "0.3,0.4", "--execute"]) == 0
     said = dict(part.split(" ") for part in capsys.readouterr().out.strip().split("; "))
@@ -67,27 +60,6 @@ def test_many_goals_go_in_and_out_as_tables_whose_numbers_are_exact(path, lived,
         assert [float(row[f"theta_{k}"]) for k in range(7)] == estimate.theta.tolist()
         assert [float(row[f"expected_{k}"]) for k in range(2)] == estimate.expected.tolist()
         assert float(row["expected_deviation"]) == estimate.expected_deviation
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        ([], "give --goal X,Y or --goals FILE"),
-        (["--goal", "0.3"], "goal must have shape (..., 2)"),
-        (["--goal", "0.3,40"], "goal must lie in its box"),
-        (["--goal", "0.3,0.4", "--context", "1"], "--context must have shape (..., 0)"),
-        (["--goal", "0.3,0.4", "--trajectory", "joints.csv"], "no motor primitive that gives joints over time"),
-        (["--goals", "bad.csv"], "bad.csv: row 2 is no goal of 2 numbers: 1,z"),
-        (["--goals", "first.csv"], "first.csv: row 1 is no goal of 2 numbers: 0.3,1_0"),
-        (["--goals", "lost.csv"], "lost.csv cannot be read or written"),
-    ],
-)
-def test_a_wrong_request_is_told(path, tmp_path, monkeypatch, capsys, words, said):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "bad.csv").write_text("0,1\n1,z\n")
-    (tmp_path / "first.csv").write_text("0.3,1_0\n")
-    assert command(main, [str(path), *words]) == 2
-    assert said in capsys.readouterr().err
 
 
 def test_the_joints_over_time_are_those_of_the_primitive(tmp_path, capsys):

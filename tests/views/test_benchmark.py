@@ -118,31 +118,6 @@ class Spread:
 """
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ("nowhere --out g.npz", "nowhere does not exist; runs are in OUT/NAME/seed-000"),
-        ("runs --out g.csv", "--out must be a .npz file in a folder that exists, got g.csv"),
-        ("runs --out g.npz --tiles 0", "--tiles must be a whole number >= 1, got 0"),
-        ("runs more --out g.npz", "all runs must be of one environment with one T: runs/random/seed-000 is of Slider2"),
-    ],
-)
-def test_what_cannot_be_made_is_refused_in_a_line_and_nothing_is_written(own, capsys, options, message):
-    run("--environment", "sliders:Slider2", movements=60)
-    run("--environment", "sliders:Slider3", "--out", "more", movements=20)
-    before = sorted(path for path in own.rglob("*") if "__pycache__" not in str(path))
-    capsys.readouterr()
-    try:
-        code = command(main, options.split())
-    except SystemExit as end:
-        code = end.code
-    said = capsys.readouterr().err
-    assert code == 2
-    assert message in said
-    assert "Traceback" not in said
-    assert sorted(path for path in own.rglob("*") if "__pycache__" not in str(path)) == before
-
-
 def test_a_unit_with_escape_codes_is_refused_and_does_not_reach_the_terminal(own, capsys):
     run("--environment", "sliders:Slider2")
     found = read_run("runs/random/seed-000")

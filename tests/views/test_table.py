@@ -22,14 +22,6 @@ from sgimd_torch.views.table import main
 SEEDS = 5
 
 
-def damage(path):
-    """Change some bytes in the middle of the largest file of a run."""
-    file = max(path.iterdir(), key=lambda each: each.stat().st_size)
-    content = bytearray(file.read_bytes())
-    content[len(content) // 2 : len(content) // 2 + 4] = b"junk"
-    file.write_bytes(content)
-
-
 FEW = "fewer than 5 seeds, too few for an interval: sgim-d (1)\n"
 
 
@@ -88,24 +80,10 @@ def test_numbers_are_interquartile_means_with_intervals_if_there_are_five_seeds_
     assert head[1:] == list(rows["random"])[1:]
 
 
-def test_a_goal_missed_by_far_moves_the_mean_and_not_the_median(runs, monkeypatch, capsys):
-    read_whole = variants.read_run
-
-    def read(path):
-        run = read_whole(path)
-        own = run.evaluations["own"] | {"mean_error": np.full(2, 0.41), "median_error": np.full(2, 0.05)}
-        return replace(run, evaluations={**run.evaluations, "own": own})
-
-    monkeypatch.setattr(variants, "read_run", read)
-    assert table(runs / "sgim-d", "--at", 40) == 0
-    row = rows_of(capsys.readouterr().out)["sgim-d"]
-    assert (row["error (m)"], row["median (m)"]) == ("0.410", "0.050")
-
-
 def test_csv_has_all_digits_and_columns_of_the_ends_of_intervals(runs, capsys):
     assert table(runs, "--at", 40, "--format", "csv") == 0
     rows = {row["variant"]: row for row in csv.DictReader(io.StringIO(capsys.readouterr().out))}
-    found = variants.Variant("random", variants.read(runs)["random"], 40).last_error
+    found = variants.Variant("random", variants.read_runs(runs)["random"], 40).last_error
     cells = [rows["random"][f"error (m){end}"] for end in ("", " low", " high")]
     assert tuple(map(float, cells)) == found
     assert rows["sgim-d"]["error (m) low"] == ""
@@ -180,33 +158,6 @@ def test_an_unfinished_run_counts_where_it_was_evaluated_and_is_named_where_it_w
         assert (left_out in said.err) == (seeds == "4")
 
 
-def test_runs_without_a_common_evaluation_need_at(copied, tiny, capsys):
-    options = "--algorithm random --name other --movements 50 --repeats 0 --evaluate_at 30"
-    assert live([*options.split(), "--benchmark", str(tiny), "--out", str(copied)]) == 0
-    assert table(copied) == 2
-    assert "never evaluated after the same number of movements; choose one with --at" in capsys.readouterr().err
-
-
-def test_runs_that_were_never_evaluated_have_no_errors_to_compare(tmp_path, capsys):
-    assert live(["--algorithm=random", "--movements=5", "--evaluate-at=[]", f"--out={tmp_path}"]) == 0
-    assert table(tmp_path, "--baseline", "random") == 2
-    assert "no finished run was evaluated; were they made with --evaluate-at '[]'?" in capsys.readouterr().err
-
-
-def test_a_run_that_is_too_short_is_named(runs, capsys):
-    assert table(runs, "--at", 5000) == 2
-    assert "seed-000 was not evaluated after 5000 movements" in capsys.readouterr().err
-
-
-def test_a_damaged_run_is_named_and_nothing_is_printed(copied, capsys):
-    path = copied / "random" / "seed-001"
-    damage(path)
-    assert table(copied) == 2
-    said = capsys.readouterr()
-    assert not said.out
-    assert str(path) in said.err
-
-
 def test_a_folder_without_a_run_is_named(copied, capsys):
     shutil.move(copied / "random/seed-001/run.sqlite", copied / "random/seed-001/run.sqlite.bak")
     assert table(copied) == 0
@@ -239,14 +190,6 @@ def test_few_seeds_are_compared_with_the_baseline_by_their_differences_alone(run
     )
     assert head == "minus random (m)"
     assert found == {"random": "-", "sgim-d": f"{ours - theirs:+.4f}"}  # of the only seed that both have
-
-
-def test_a_baseline_that_is_no_variant_is_refused_with_the_near_name(runs, capsys):
-    assert table(runs, "--at", 40, "--baseline", "randon") == 2
-    said = capsys.readouterr()
-    assert not said.out
-    assert "'randon'; did you mean random? Known are random, sgim-d" in said.err
-    assert said.err.count("\n") == 1
 
 
 def test_columns_are_as_wide_as_their_widest_cell_and_lines_end_with_text(capsys):

@@ -26,9 +26,13 @@ from sgimd_torch.views.film.reel import HEIGHT, WIDTH, Shot
 
 MOST_PAST: Final = 250  # largest number of past landings in a frame; 250 landings double the time of drawing a frame
 
-_Colour = tuple[float, float, float, float]
-_INK, _FLOAT, GOAL, _PATH = (0.06, 0.06, 0.08, 1), (0.92, 0.24, 0.02, 1), (0.94, 0.89, 0.26, 1), (0.6, 0.28, 0.12, 1)
-PAST, _RING = (0.92, 0.96, 1, 0.7), (0.85, 0.93, 0.97, 0.45)
+Colour = tuple[float, float, float, float]  # red, green, blue, opacity
+LINE: Final = (0.06, 0.06, 0.08, 1.0)  # colour of the fishing line
+FLOAT: Final = (0.92, 0.24, 0.02, 1.0)  # colour of the float
+PATH: Final = (0.6, 0.28, 0.12, 1.0)  # colour of the float's path
+RING: Final = (0.85, 0.93, 0.97, 0.45)  # colour of the circles around the arm
+GOAL: Final = (0.94, 0.89, 0.26, 1.0)  # colour of the goal
+PAST: Final = (0.92, 0.96, 1.0, 0.7)  # colour of past outcomes
 
 
 class Camera:
@@ -70,15 +74,15 @@ class Camera:
         self._renderer.update_scene(self._data, camera="shore")
         scene, float_at_time = self._renderer.scene, recording.float_at(time)
         for radius in (0.5, 1.0):
-            draw_chain(scene, _circle(np.zeros(2), radius), 0, _RING)
+            draw_chain(scene, _circle(np.zeros(2), radius), 0, RING)
         for landing in shot.past[:: max(1, math.ceil(len(shot.past) / MOST_PAST))]:
             draw(scene, mujoco.mjtGeom.mjGEOM_BOX, (0.007, 0.007, 0.001), np.append(landing, 0.001), PAST)
         draw_chain(scene, _circle(shot.goal, 0.06), 0.008, GOAL)
-        draw_chain(scene, [*(recording.float_at(t) for t in np.arange(0.0, time, 0.02)), float_at_time], 0, _PATH)
+        draw_chain(scene, [*(recording.float_at(t) for t in np.arange(0.0, time, 0.02)), float_at_time], 0, PATH)
         loose = recording.let_out is not None and time > recording.let_out
         hinges = [] if loose else self._data.xpos[self._line]
-        draw_chain(scene, [self._data.site_xpos[self._tip], *hinges, float_at_time], 0.003, _INK)
-        draw(scene, mujoco.mjtGeom.mjGEOM_SPHERE, (0.026, 0, 0), float_at_time, _FLOAT).emission = 0.4
+        draw_chain(scene, [self._data.site_xpos[self._tip], *hinges, float_at_time], 0.003, LINE)
+        draw(scene, mujoco.mjtGeom.mjGEOM_SPHERE, (0.026, 0, 0), float_at_time, FLOAT).emission = 0.4
         if time == recording.landed:
             draw_chain(scene, [np.append(shot.goal, 0.006), np.append(recording.outcome, 0.006)], 0.005, GOAL)
         return Image.fromarray(self._renderer.render())
@@ -116,14 +120,14 @@ def _circle(centre: Array, radius: float) -> Array:
     return np.append(centre, 0.004) + radius * np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
 
 
-def draw_chain(scene: mujoco.MjvScene, points: Sequence[Array] | Array, radius: float, colour: _Colour) -> None:
+def draw_chain(scene: mujoco.MjvScene, points: Sequence[Array] | Array, radius: float, colour: Colour) -> None:
     """Join points by rods of a ``radius`` (m); a radius of 0 draws lines, which is faster."""
     kind, width = (mujoco.mjtGeom.mjGEOM_CAPSULE, radius) if radius else (mujoco.mjtGeom.mjGEOM_LINE, 2)  # pixels
     for start, stop in pairwise(points):
         mujoco.mjv_connector(draw(scene, kind, (width, 0, 0), start, colour), kind, width, start, stop)
 
 
-def draw(scene: mujoco.MjvScene, kind: int, size: Sequence[float], place: Array, colour: _Colour) -> Any:
+def draw(scene: mujoco.MjvScene, kind: int, size: Sequence[float], place: Array, colour: Colour) -> Any:
     """Add a geom to the scene; MuJoCo defines the meaning of ``size`` (m) for each ``kind``."""
     geom = scene.geoms[scene.ngeom]
     mujoco.mjv_initGeom(geom, kind, np.array(size), place, np.eye(3).ravel(), np.array(colour, np.float32))

@@ -22,8 +22,10 @@ from sgimd_torch.views.film.camera import GOAL, MOST_PAST, PAST, draw, draw_chai
 from sgimd_torch.views.film.reel import HEIGHT, WIDTH, Shot
 
 FILLED: Final = 0.8  # share of the picture, in height and width, that shows robot and T
-_BORDER, _PATH, _END = (0.2, 0.5, 0.6, 1), (0.88, 0.54, 0.33, 1), (0.82, 0.2, 0.12, 1)
-_BALL: Final = mujoco.mjtGeom.mjGEOM_SPHERE
+BORDER: Final = (0.2, 0.5, 0.6, 1.0)  # colour of the border of T
+PATH: Final = (0.88, 0.54, 0.33, 1.0)  # colour of the paths of measured places
+END: Final = (0.82, 0.2, 0.12, 1.0)  # colour of the measured places
+BALL: Final = mujoco.mjtGeom.mjGEOM_SPHERE
 
 
 class ModelCamera:
@@ -71,16 +73,16 @@ class ModelCamera:
         self._renderer.update_scene(self._at(recording.states[row]), camera=self._camera)
         scene, size = self._renderer.scene, 0.012 * self._far
         for edge in _edges(self._robot, shot):
-            draw_chain(scene, edge, 0, _BORDER)
+            draw_chain(scene, edge, 0, BORDER)
         for place in self._robot.located(shot.past[:: max(1, math.ceil(len(shot.past) / MOST_PAST))], start).reshape(
             -1, 3
         ):
-            draw(scene, _BALL, (size / 3, 0, 0), place, PAST)
+            draw(scene, BALL, (size / 3, 0, 0), place, PAST)
         for k, goal in enumerate(self._robot.located(shot.goal[None], start)[0]):
             path = recording.path[: row + 1, k]
-            draw_chain(scene, path, 0, _PATH)
-            draw(scene, _BALL, (1.6 * size, 0, 0), goal, (*GOAL[:3], 0.6)).emission = 0.4
-            draw(scene, _BALL, (0.8 * size, 0, 0), path[-1], _END).emission = 0.4
+            draw_chain(scene, path, 0, PATH)
+            draw(scene, BALL, (1.6 * size, 0, 0), goal, (*GOAL[:3], 0.6)).emission = 0.4
+            draw(scene, BALL, (0.8 * size, 0, 0), path[-1], END).emission = 0.4
             if time >= recording.landed:
                 draw_chain(scene, [goal, path[-1]], 0.4 * size, GOAL)
         return Image.fromarray(self._renderer.render())

@@ -32,8 +32,13 @@ from sgimd_torch.views.film.reel import HEIGHT, WIDTH, Frame, Shot
 MARGINS: Final = (0.06, 0.11)  # margins as shares of the width and the height of the picture
 DPI: Final = 100
 TEXT: Final[Any] = {"font.size": 8, "axes.titlesize": 9, "axes.titlelocation": "left"}  # style of the panel
-_PAPER, _FRAME, _LINK = "#f7f5f0", "#c9c4b8", "#2b3a4a"
-_PATH, _END, _OBJECT, _PAST = "#e08a55", "#d1341f", "#2f7f6f", "#9db4c8"
+PAPER: Final = "#f7f5f0"  # colour of the background
+BORDER: Final = "#c9c4b8"  # colour of the border of T
+LINK: Final = "#2b3a4a"  # colour of the robot's links
+PATH: Final = "#e08a55"  # colour of the path of a chain's end
+END: Final = "#d1341f"  # colour of a chain's end, and of the outcome
+OBJECT: Final = "#2f7f6f"  # colour of an object
+PAST: Final = "#9db4c8"  # colour of past outcomes
 
 
 class Sketchbook:
@@ -56,7 +61,7 @@ class Sketchbook:
         room = np.array([WIDTH, HEIGHT]) * (1 - 2 * np.array(MARGINS))
         half = np.array([WIDTH, HEIGHT]) / (room / np.maximum(high - low, 1e-9)).min() / 2
         self._low, self._high = (low + high) / 2 - half, (low + high) / 2 + half
-        self._figure = blank(WIDTH, facecolor=_PAPER)
+        self._figure = blank(WIDTH, facecolor=PAPER)
         self._ax = self._figure.add_axes((0, 0, 1, 1))
 
     def frame(self, shot: Shot, time: float) -> Image.Image:
@@ -67,16 +72,16 @@ class Sketchbook:
         ax.set_axis_off()
         ax.set(xlim=(self._low[0], self._high[0]), ylim=(self._low[1], self._high[1]))
         if self._space.dim > 1:
-            ax.add_patch(Rectangle(self._space.low[:2], *self._space.sides[:2], fill=False, edgecolor=_FRAME))  # type: ignore[arg-type]
-        ax.plot(*in_picture(shot.past).T, "o", color=_PAST, ms=2, mec="none")
+            ax.add_patch(Rectangle(self._space.low[:2], *self._space.sides[:2], fill=False, edgecolor=BORDER))  # type: ignore[arg-type]
+        ax.plot(*in_picture(shot.past).T, "o", color=PAST, ms=2, mec="none")
         goal_rings(ax, in_picture(shot.goal[None]), 14)
         for chain in sketch.chains:
-            ax.plot(*chain[: last + 1, -1].T, color=_PATH, lw=1.5)
+            ax.plot(*chain[: last + 1, -1].T, color=PATH, lw=1.5)
         for chain in sketch.chains:
-            ax.plot(*chain[last].T, "o-", color=_LINK, mfc="white", lw=3.5, ms=4)
-            ax.plot(*chain[last, -1:].T, "o", color=_OBJECT if chain.shape[1] == 1 else _END, ms=7)
+            ax.plot(*chain[last].T, "o-", color=LINK, mfc="white", lw=3.5, ms=4)
+            ax.plot(*chain[last, -1:].T, "o", color=OBJECT if chain.shape[1] == 1 else END, ms=7)
         if time >= sketch.landed:
-            ax.plot(*in_picture(sketch.outcome[None]).T, "x", color=_END, ms=12, mew=2)
+            ax.plot(*in_picture(sketch.outcome[None]).T, "x", color=END, ms=12, mew=2)
         return Image.fromarray(pixels(self._figure))
 
     def note(self, shot: Shot, time: float) -> str:

@@ -19,7 +19,7 @@ from sgimd_torch.runs.signals import parser_of
 from sgimd_torch.views.report import figures, provenance
 from sgimd_torch.views.results import results
 from sgimd_torch.views.statistics import LEAST_SEEDS, Interval, show
-from sgimd_torch.views.variants import Variant, baseline_of, best_first, compare, read, unit_of
+from sgimd_torch.views.variants import Variant, baseline_of, best_first, compare, read_runs, unit_of
 
 EXAMPLES = """examples:
   sgimd report runs/sgim-d/seed-003               one run, into runs/sgim-d/seed-003/report.html
@@ -40,7 +40,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     out = options.out or options.runs / "report.html"
     if options.out is not None and (out.is_dir() or not out.parent.is_dir()):  # before any work
         raise RunError(f"--out must be a file in a folder that exists, got {out}")
-    variants = best_first(Variant(name, runs) for name, runs in read(options.runs).items())
+    variants = best_first(Variant(name, runs) for name, runs in read_runs(options.runs).items())
     write_text(out, page(options.runs, variants, options.baseline))
     print(out)
     return 0

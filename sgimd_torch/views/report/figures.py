@@ -20,6 +20,7 @@ from matplotlib.figure import Figure
 from sgimd_torch.figures.axes import LEGEND, alike, limits, over_movements
 from sgimd_torch.figures.learning import COLOURS, interest_map, landing_points, map_after
 from sgimd_torch.figures.learning import misses as draw_misses
+from sgimd_torch.figures.save import STYLE as FILE_STYLE
 from sgimd_torch.figures.sections import Section, of_regions, sections
 from sgimd_torch.runs.read import Run
 from sgimd_torch.spaces import Array, Box, rounded
@@ -33,13 +34,10 @@ MOST_CURVES: Final = 8  # largest number of curves in one figure
 WIDE: Final = 4.3  # inches, width of the axes of a map, without colour bar
 MARGIN: Final = 1.2  # inches, height above and below the axes
 STYLE: Final[Any] = {
+    **FILE_STYLE,
     "font.size": 11,
-    "text.parse_math": False,  # names of a user are no formulas
     "axes.titlesize": 11,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
     "axes.formatter.useoffset": False,
-    "lines.linewidth": 2,
     "legend.fontsize": 10,
 }
 # Colours for further variants of an algorithm, from Okabe & Ito and P. Tol; no algorithm of the paper has one of them.
@@ -91,7 +89,7 @@ def error_curves(figure: Figure, variants: Sequence[Variant], colours: Mapping[s
             ax.fill_between(variant.evaluated, low, high, color=colour, alpha=0.2, linewidth=0)
         if n > 1 and len(variants) == 1:
             ax.plot(variant.evaluated, variant.errors.T, color=colour, linewidth=0.7, alpha=0.4)
-        label = f"{_plain(variant.label)} ({_seeds(n)})"
+        label = f"{_curve_name(variant.label)} ({_seeds(n)})"
         ax.plot(variant.evaluated, centre, "o-", color=colour, markersize=4.5, label=label)
         if len(variants) == 1:
             floor = variant.floors.mean(axis=0)
@@ -198,7 +196,7 @@ def _panels(figure: Figure, maps: Sequence[Section]) -> list[Axes]:
     return list(figure.subplots(len(maps), 1, squeeze=False, height_ratios=heights).flat)
 
 
-def _plain(name: str) -> str:
+def _curve_name(name: str) -> str:
     """A name as a matplotlib label: shortened, and not hidden (by a leading _)."""
     short = name if len(name) <= 32 else f"{name[:30]}…"
     return f"{' ' * short.startswith('_')}{short}"
