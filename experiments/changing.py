@@ -127,15 +127,15 @@ def errors(
     learner: Learner, world: Environment, seed: int, goals: Array, start: int, counts: Collection[int]
 ) -> dict[int, tuple[float, int]]:
     """Mean error at the goals (unit of T), and changes noticed, by number of movements after the first ``start``."""
-    found = {}
+    errors_at = {}
     for episode in run(learner, world, seed, movements=start + max(counts)):
         made = episode.index + 1
         if isinstance(world, Changing):
             world.made = made
         if made - start in counts:
             evaluation = evaluate(learner.inverse, world, goals, 1, step=made, repeats=0)
-            found[made - start] = evaluation.mean_error, len(learner.changes)
-    return found
+            errors_at[made - start] = evaluation.mean_error, len(learner.changes)
+    return errors_at
 
 
 def after(robot: str) -> tuple[int, ...]:

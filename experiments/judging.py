@@ -129,7 +129,7 @@ def at_least(
 @cache
 def _above(part: Part, level: Level) -> tuple[float, float, float]:
     """Number, low and high end of a part, as distances from its bar; a distance above 0 is on the wrong side."""
-    value, low, high = (each - part.bar for each in part.measured(level=level))
+    value, low, high = (end - part.bar for end in part.measured(level=level))
     return (-value, -high, -low) if part.least else (value, low, high)
 
 

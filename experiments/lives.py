@@ -40,7 +40,7 @@ def make_lives(folder: Path, name: str, life: Life, lives: Mapping[tuple[Any, ..
     pool = get_context("spawn").Pool(processes, signal.signal, (signal.SIGINT, signal.SIG_IGN))
     with pool, Progress(name, sum(map(lives.__getitem__, left))) as progress:
         for n, (key, made) in enumerate(pool.imap_unordered(partial(_made, life), left), 1):
-            merge(folder, name, [dict(zip(columns, (*key, at, *found), strict=True)) for at, found in made.items()])
+            merge(folder, name, [dict(zip(columns, (*key, at, *errors), strict=True)) for at, errors in made.items()])
             done += lives[key]
             progress.show(done, f"{n} of {len(left)} lives")
 

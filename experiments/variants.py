@@ -115,10 +115,10 @@ def _on_tasks(learners: dict[str, Variant], tasks: Iterable[str]) -> dict[str, V
 
 def _ladder(ending: str, where: Variant) -> dict[str, Variant]:
     """The steps between the letter of the paper, ``sgim-d-letter``, and our defaults, ``sgim-d``."""
-    found, line = {}, {**SGIM_D, **LETTER, **where, **END}
+    ladder, line = {}, {**SGIM_D, **LETTER, **where, **END}
     for number, (step, _, becomes) in enumerate(STEPS[:-1], 1):
-        found[f"ladder-{number}-{step}{ending}"] = line = {**line, **becomes}
-    return found
+        ladder[f"ladder-{number}-{step}{ending}"] = line = {**line, **becomes}
+    return ladder
 
 
 EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
@@ -235,7 +235,7 @@ def make_subsets(folder: Path) -> None:
         OSError: a file cannot be written.
     """
     everything = load_demonstrations()
-    outcomes = np.array([each.outcome for each in everything])
+    outcomes = np.array([demonstration.outcome for demonstration in everything])
     corner = np.linalg.norm(outcomes - outcomes.max(axis=0), axis=1).argsort()[:20]
     make_folder(folder)
     save_demonstrations(folder / CORNER, [everything[k] for k in corner])

@@ -110,7 +110,7 @@ random streams: of a name only the first letter counts | spaces.py | test_spaces
     *name.encode() ==> *name[:1].encode()
 failures: a failed movement does not count | learner/__init__.py | learner/test_failures.py
     self.movements += 1 ==> self.movements += not isinstance(outcome, Failure)
-at once: attempts are replayed out of order | learner/__init__.py | learner/test_life.py
+at once: attempts are replayed out of order | learner/__init__.py | learner/test_at_once.py
     return [] if in_order else ==> return [] if reported else
 """
 

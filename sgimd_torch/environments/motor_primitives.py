@@ -85,7 +85,7 @@ class GaussianPrimitive(Primitive):
         first = weights * apart
         second = weights * (apart**2 - (first * slopes).sum(axis=1, keepdims=True))
         # The weights sum to 1, so their derivatives sum to 0: the positive ones sum to half of all absolute values.
-        speed, acceleration = (np.abs(each).sum(axis=1).max() / 2 for each in (first, second))
+        speed, acceleration = (np.abs(derivative).sum(axis=1).max() / 2 for derivative in (first, second))
         return self.joints.sides * speed / self.durations[0], self.joints.sides * acceleration / self.durations[0] ** 2
 
     def correspondence(self, times: ArrayLike, trajectory: ArrayLike) -> Array:

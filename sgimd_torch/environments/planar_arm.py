@@ -74,7 +74,7 @@ class PlanarArm:
 
     def execute_many(self, contexts: Array, thetas: Array, rngs: Sequence[np.random.Generator]) -> Array:
         """``(n, 2)`` m, outcomes of movements side by side; row i equals ``execute`` for row i bit for bit."""
-        return self._end(contexts, np.stack([self._moved(*each) for each in zip(thetas, rngs, strict=True)]))
+        return self._end(contexts, np.stack([self._moved(*movement) for movement in zip(thetas, rngs, strict=True)]))
 
     def trace(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Sketch:
         """Drawings of a movement: in 1 s all joints turn smoothly from the straight arm to their angles."""

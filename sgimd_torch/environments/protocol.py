@@ -128,13 +128,13 @@ class FromFiles(Protocol):
     Attributes:
         files: files whose checksums a run keeps.
         remarks: sentences for the user.
-        found: values of the options that the environment finds by movements if they are not given. A run keeps them in
-            its settings, so they are found once. The class lists the names of these options as ``FOUND``.
+        found_options: values of the options that the environment finds by movements if they are not given. A run keeps
+            them in its settings, so they are found once. ``FOUND_OPTIONS`` of the class has their names.
     """
 
     files: Sequence[Path]
     remarks: Sequence[str]
-    found: Mapping[str, Any]
+    found_options: Mapping[str, Any]
 
 
 def primitive_of(environment: Environment) -> Primitive:

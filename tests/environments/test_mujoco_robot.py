@@ -225,10 +225,10 @@ def test_outcomes_are_located_in_the_world_from_where_the_movement_begins(here):
 def test_what_was_found_is_given_to_the_next_robot_which_makes_no_movement(here, monkeypatch):
     options = {"model": "arm.xml", "outcome": "site:tip:xy", "noise": 0.01}
     first = MujocoRobot(**options)
-    assert first.found.keys() == {*MujocoRobot.FOUND}
+    assert first.found_options.keys() == {*MujocoRobot.FOUND_OPTIONS}
     monkeypatch.setattr(MujocoRobot, "_simulate", lambda *_: pytest.fail("it moved"))
-    second = MujocoRobot(**options, **first.found)
-    assert second.found == first.found
+    second = MujocoRobot(**options, **first.found_options)
+    assert second.found_options == first.found_options
     assert second.outcome_noise == first.outcome_noise > 0
     assert second.remarks == []
 
@@ -252,7 +252,7 @@ def test_a_run_keeps_what_was_found_and_a_resume_finds_nothing_anew(here, capsys
 
 def test_a_robot_made_by_a_function_of_the_user_has_no_options_to_keep(here):
     made_by = Config(parts={"environment": "planar-arm-7"})
-    assert made_by.with_found(MujocoRobot("arm.xml", outcome="site:tip:xy", **CORNERS).found) == made_by
+    assert made_by.with_found(MujocoRobot("arm.xml", outcome="site:tip:xy", **CORNERS).found_options) == made_by
 
 
 @pytest.mark.parametrize(
