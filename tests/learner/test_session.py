@@ -184,17 +184,6 @@ class BreaksOff(CountingArm):
         return super().execute(context, theta, rng)
 
 
-def test_after_a_movement_that_was_broken_off_a_run_goes_on_when_it_is_given_up() -> None:
-    arm = BreaksOff(16)
-    learner = make("sagg-riac", arm)
-    with pytest.raises(KeyboardInterrupt):
-        list(run(learner, arm, 0, movements=60))
-    with pytest.raises(RuntimeError, match=r"interrupt\(\)"):
-        list(run(learner, arm, 0, movements=60))
-    learner.interrupt()
-    assert len(list(run(learner, arm, 0, movements=60))) == 44
-
-
 def test_a_lesson_whose_answer_was_given_up_is_offered_again_and_such_a_life_can_be_loaded(tmp_path: Path) -> None:
     arm, other = BreaksOff(15), PlanarArm(5, noise=0.05)
     learner, teacher = make("sgim-d", arm), teacher_of(other, 5)

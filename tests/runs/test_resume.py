@@ -185,7 +185,7 @@ def test_a_damaged_run_is_refused_and_left_as_it_is(tmp_path, copy, go, capsys, 
     before = files_of(copy)
     assert go(tmp_path, "--resume") == 2
     said = capsys.readouterr().err
-    assert re.search(rf"{message}.*sqlite3 run.sqlite .recover saves what can be read", said)
+    assert re.search(rf"{message}.*sqlite3 run.sqlite .recover prints what can be read", said)
     assert "Traceback" not in said
     assert files_of(copy) == before
 
