@@ -6,8 +6,8 @@
 `layout` has the tables, and ``docs/runs.md`` explains each column: settings and other facts (``about``), everything
 that happened (``events``), each demonstration once, and tables that a replay fills again (``DERIVED``).
 
-Every row ends in a checksum of itself and its number, and ``about`` has the number of rows of each table. So reading raises
-an error if a row was changed, lost, doubled or moved.
+Every row ends in a checksum of itself and its number, and ``about`` has the number of rows of each table. So
+reading raises an error if a row was changed, lost, doubled or moved.
 """
 
 from __future__ import annotations
