@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from sgimd_torch.inverses.local_process import Learnt
 from sgimd_torch.memory import Memory, Rows
 from sgimd_torch.memory.compiled import compiled
-from sgimd_torch.memory.neighbours import PolicyNeighbours, Table
+from sgimd_torch.memory.neighbours import Neighbours
+from sgimd_torch.memory.table import Table
 from sgimd_torch.spaces import Array
 
 NEAR: Final = 60  # largest number of exemplars from which a movement is predicted
@@ -53,7 +54,7 @@ class Regime:
     def __init__(self, learnt: Learnt, exemplars: Exemplars) -> None:
         self.learnt, self.exemplars = learnt, exemplars
         here = self._in_lengths(exemplars)
-        self._neighbours = PolicyNeighbours(Table(here.shape[1]))
+        self._neighbours = Neighbours(Table(here.shape[1]))
         self._neighbours.keys.append(here)
 
     def predict(self, asked: Exemplars) -> tuple[Array, Array, Array]:
@@ -88,7 +89,7 @@ class Regime:
 
 
 def predicted(
-    inputs: PolicyNeighbours, outcomes: Array, near: Rows, here: Array, kernel: Array
+    inputs: Neighbours, outcomes: Array, near: Rows, here: Array, kernel: Array
 ) -> tuple[Array, Array, Array]:
     """Result of `kernels.predict`."""
     predict = compiled("sgimd_torch.changes.kernels").predict

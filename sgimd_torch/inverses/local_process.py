@@ -17,7 +17,8 @@ from sgimd_torch.inverses.gaussian_process import choose_kernel, fit_lengths, on
 from sgimd_torch.inverses.locally_linear import NEAR, LocallyLinear
 from sgimd_torch.inverses.nearest import near_goal
 from sgimd_torch.memory.compiled import compiled
-from sgimd_torch.memory.neighbours import PolicyNeighbours, Table
+from sgimd_torch.memory.neighbours import Neighbours
+from sgimd_torch.memory.table import Table
 from sgimd_torch.parts import Inverse, Problem
 from sgimd_torch.spaces import Array, Estimate, stream
 
@@ -32,7 +33,7 @@ _FAR: Final = 1e3  # inputs more spreads from 0 are shifted to 0 first: rounding
 class Learnt(NamedTuple):
     """Exemplars in lengths, ``(n, dim)``; origin and size of a length ``(2, dim)``; kernel ``(4,)``, see `Kernel`."""
 
-    inputs: PolicyNeighbours
+    inputs: Neighbours
     units: Array
     kernel: Array
 
@@ -134,7 +135,7 @@ class LocalProcess(Inverse):
         drawn = order[:_FITTED]
         lengths = fit_lengths((raw[drawn] - origin) / self._spreads, outcomes[drawn])
         self._units = np.stack((origin, self._spreads * lengths))
-        self._inputs = PolicyNeighbours(Table(raw.shape[1]))
+        self._inputs = Neighbours(Table(raw.shape[1]))
         self._inputs.keys.append(self._scaled(0)[:n])
         inputs = self._inputs.keys.rows
         groups = self._inputs.nearest(inputs[order[:_GROUPS]], _GROUP)
