@@ -169,9 +169,9 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
             "map-elites-tuned": {"algorithm": "map-elites", "cells": 10},
             "cma-me-tuned": {"algorithm": "cma-me", "sd": 0.05},
             "cma-mae-taught-tuned": {"algorithm": "cma-mae-taught", "sd": 0.05},
-            "home-babbling": {"algorithm": "experiments.home_babbling:home_babbling"},
+            "home-babbling": {"algorithm": "experiments.rivals:home_babbling"},
             "random-middle": {**MIDDLE, "inverse": "process", "global_range": (1.0, 1.0)},
-            "map-elites-middle": {"algorithm": "experiments.parts:map_elites_middle"},
+            "map-elites-middle": {"algorithm": "experiments.rivals:map_elites_middle"},
             "middle": MIDDLE,
             "middle-process": {**MIDDLE, "inverse": "process"},
         }.items()

@@ -87,9 +87,9 @@ index: contexts do not count | memory/__init__.py | memory/test_memory.py
 index: of equally near exemplars the newest first | memory/scan.py | memory/test_memory.py
     squared[place - 1] > distance ==> squared[place - 1] >= distance
 index: the radius is squared once | memory/neighbours.py | memory/test_memory.py
-    <= radius * radius ==> <= radius
+    np.where(squared <= within * within, rows, -1) ==> np.where(squared <= within, rows, -1)
 index: a larger k gets the rows of the last query | memory/neighbours.py | memory/test_neighbours.py
-    asked != key or k > found.rows.shape[1] ==> asked != key
+    asked != key or rows.shape[1] < min(n, max(k, LISTED)) or ==> asked != key or
 a Gaussian process with another kernel | inverses/kernels.py | inverses/test_local_process.py
     5 / 3 * distance**2) * decay ==> 5 / 2 * distance**2) * decay
 requests: a teacher without a reply costs nothing | asking/strategy.py | asking/test_asking.py

@@ -63,17 +63,10 @@ class Sinusoids(Primitive):
         return self.commands.clip((low + high) / 2 + (high - low) / 2 * waves)
 
     def correspondence(self, times: ArrayLike, trajectory: ArrayLike) -> Array:
-        """theta_d, the policy whose commands come nearest to the recorded commands, eq. (6).
+        """theta_d, the policy whose commands come nearest to the recorded commands; see `Translating`.
 
         The fit takes the best frequency of a grid and refines it; for a fixed frequency the fit is linear. The fit is
         exact if no command was clipped.
-
-        Args:
-            times: ``(n_times,)`` s, increasing.
-            trajectory: ``(n_times, n_commands)``, the commands at ``times``.
-
-        Raises:
-            ValueError: shapes do not fit, values are not finite, or times are not sorted.
         """
         from scipy.optimize import minimize_scalar
 

@@ -180,13 +180,7 @@ class MujocoRobot:
         return self.contexts.sample(rng)
 
     def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
-        """``(outcome_dim,)``, the outcome of one movement.
-
-        Raises:
-            ValueError: ``context`` is not one point of C, or ``theta`` is not one point of Pi.
-            TypeError: ``rng`` is not a Generator.
-            SimulationError: the simulation diverged; the message names theta.
-        """
+        """``(outcome_dim,)``, the outcome of one movement; see `Environment`."""
         context, theta = check_movement(self, context, theta)
         outcome = self.execute_many(context[None], theta[None], [rng])[0]
         if np.isnan(outcome).any():
@@ -194,7 +188,7 @@ class MujocoRobot:
         return outcome
 
     def execute_many(self, contexts: Array, thetas: Array, rngs: Sequence[np.random.Generator]) -> Array:
-        """``(n, outcome_dim)``, outcomes, NaN if a simulation diverged; row i equals ``execute`` for row i."""
+        """``(n, outcome_dim)``, outcomes; NaN if a simulation diverged. See `BatchEnvironment`."""
         commands = [self._commands(theta, rng) for theta, rng in zip(thetas, rngs, strict=True)]
         outcomes = np.empty((len(thetas), self._dim))
         for start in range(0, len(thetas), _BLOCK):

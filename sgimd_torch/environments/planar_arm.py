@@ -63,12 +63,7 @@ class PlanarArm:
         return self.contexts.sample(rng)
 
     def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
-        """``(2,)`` m, position of the end after one movement.
-
-        Raises:
-            ValueError: ``context`` is not one point of C, or ``theta`` is not one point of Pi.
-            TypeError: ``rng`` is not a Generator.
-        """
+        """``(2,)`` m, position of the end after one movement; see `Environment`."""
         context, theta = check_movement(self, context, theta)
         return self._end(context, self._moved(theta, rng))
 
@@ -96,20 +91,9 @@ class PlanarArm:
         return (2 * self.policies.check("theta", theta, "was a goal passed instead?") - 1) * self._limits
 
     def correspondence(self, times: ArrayLike, trajectory: ArrayLike) -> Array:
-        """theta_d, the policy that ends in the last posture of a demonstrated trajectory: the inverse of ``angles``.
+        """theta_d, the policy that ends in the last posture of a demonstrated trajectory; see `Translating`.
 
         The outcome depends only on the last posture, and theta_d reproduces this posture; so theta_d solves eq. (6).
-
-        Args:
-            times: ``(n_times,)`` s, increasing.
-            trajectory: ``(n_times, n_joints)`` rad.
-
-        Returns:
-            ``(n_joints,)`` in [0, 1].
-
-        Raises:
-            ValueError: shapes do not fit, values are not finite, times are not sorted, or the joints cannot take the
-                last posture.
         """
         _, trajectory = check_recording(times, trajectory, self.policies.dim, samples=1)
         turned = trajectory[-1] / self._limits

@@ -94,11 +94,11 @@ def build(config: Config) -> RunParts:
     if config.teaching:
         from sgimd_torch.runs.tasks.taught import correspondence_of
 
-        shown, given["correspondence"] = contents.get("demonstrations", ()), correspondence_of(task)
+        demonstrations, given["correspondence"] = contents.get("demonstrations", ()), correspondence_of(task)
         for make in own:
-            teacher = Teacher.of(make, shown, stream(config.seed, "teacher"))
+            teacher = Teacher.of(make, demonstrations, stream(config.seed, "teacher"))
         for word, make in asked.items():
-            teachers[word] = Demonstrator.of(make, shown, stream(config.seed, f"teacher {word}"))
+            teachers[word] = Demonstrator.of(make, demonstrations, stream(config.seed, f"teacher {word}"))
         given |= {"teachers": teachers} if teachers else {}
     algorithm = f"algorithm {config.algorithm}"
     learner = call_checked(algorithm, config.constructor("algorithm"), robot, config.seed, **given)

@@ -153,10 +153,10 @@ class Config:
         }
         return partial(part.make, **keywords)
 
-    def with_found(self, found: Mapping[str, Any]) -> Self:
-        """These settings, with options that the robot ``found`` by movements, such as the corners of T."""
-        options = {f"environment.{name}": value for name, value in found.items() if f"environment.{name}" in self}
-        return replace(self, parts={**dict(self.parts), **options})
+    def with_found(self, options: Mapping[str, Any]) -> Self:
+        """These settings, with options that the robot has found by movements, such as the corners of T."""
+        parts = {f"environment.{name}": value for name, value in options.items()}
+        return replace(self, parts={**dict(self.parts), **{name: parts[name] for name in parts if name in self}})
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -277,12 +277,17 @@ def chosen(given: Mapping[str, Any]) -> dict[str, Part]:
         make = default if callable(default) and word == usual else load_word(kind, word)
         fixed = make.keywords if isinstance(make, partial) and make is not default else {}  # those that the word fixes
         prefix = "" if name == "algorithm" else f"{name}."
-        options = {prefix + keyword: option for keyword, option in options_of(make).items() if keyword not in fixed}
-        options = {option: each for option, each in options.items() if option not in RUN}  # the run's own go first
-        choices = {option: each for option, each in options.items() if each.kind in WORDS}
-        words = {option: Option(each.kind, word_of(each.kind, each.default)) for option, each in choices.items()}
-        parts[name] = Part(kind, word, make, {**options, **words})
-        waiting[:0] = choices.items()
+        options, choices = {}, []
+        for keyword, option in options_of(make).items():
+            own = prefix + keyword
+            if keyword in fixed or own in RUN:  # an option of the run hides an option of the algorithm
+                continue
+            options[own] = option
+            if option.kind in WORDS:
+                options[own] = Option(option.kind, word_of(option.kind, option.default))
+                choices.append((own, option))
+        parts[name] = Part(kind, word, make, options)
+        waiting[:0] = choices
     return parts
 
 

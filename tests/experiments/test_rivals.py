@@ -5,8 +5,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from home_babbling import home_babbling
-from parts import map_elites_middle
+from rivals import home_babbling, map_elites_middle
 from sgimd_torch import PlanarArm, random_exploration, run
 from sgimd_torch.spaces import stream
 from toys import toss
