@@ -18,9 +18,8 @@ side = Neighbours(Table(1, np.arange(5.0)[:, None]))
 print(*side.nearest(np.array([[3.2]]), 2)[0])
 """
 LIFE = """
-from sgimd_torch import practice, run
-from experiments.toys import two_elbows
-robot = two_elbows().environment
+from sgimd_torch import PlanarArm, practice, run
+robot = PlanarArm(3, noise=0.01)
 learner = practice(robot, 1000)
 for _ in run(learner, robot, 1000, movements=300): pass
 print(hash(learner.memory.thetas.tobytes()))
