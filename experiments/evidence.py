@@ -1,6 +1,6 @@
 """The evidence of the tables of results: errors by seed, and statistics over seeds for claims, tables and figures.
 
-    evidence = Evidence.of(Path("results")); show(evidence.ratio("sgim-d", "random"))
+    evidence = Evidence.of(Path("results")); interval_text(evidence.ratio("sgim-d", "random"))
 A name is that of a variant, whose errors are those with the inverse model `process`; "sgim-d-letter by paper" names
 another inverse model. Two names, "ours" and "theirs", are compared on their common seeds. If no seed is common, they
 are compared as independent samples.
@@ -23,10 +23,9 @@ from sgimd_torch.views.statistics import (
     LEAST_SEEDS,
     LEVEL,
     Interval,
+    bootstrap_rng,
     interquartile_mean,
     interval,
-    point,
-    rng,
 )
 from table import read_table
 
@@ -258,8 +257,8 @@ def _ratio(x: Array, y: Array) -> Array:
 def _found(statistic: Callable[..., Array], *of: ArrayLike, level: Level, paired: bool = False) -> Interval:
     samples = [np.asarray(sample, dtype=np.float64) for sample in of]
     if level is None:
-        return point(float(statistic(*samples)))
-    return interval(statistic, *samples, rng=rng(), paired=paired, level=level)
+        return Interval(float(statistic(*samples)))
+    return interval(statistic, *samples, rng=bootstrap_rng(), paired=paired, level=level)
 
 
 def _two_or_more(values: pd.Series, what: str) -> pd.Series:
@@ -285,7 +284,7 @@ def improvement_interval(ours: Array, theirs: Array, *, level: float = LEVEL) ->
     Wilson's interval for this statistic has all probabilities that the data do not reject (Newcombe 2006, Statistics in
     Medicine 25:559, method 5). If all our errors are smaller than all of theirs, the interval is [.80, 1] with 10 seeds
     and [.90, 1] with 20; a bootstrap would give [1, 1] even with 2 seeds. If errors are normal, the interval has the
-    true value in 95 to 98 % of cases with 5, 10 or 20 seeds. With fewer than ``LEAST_SEEDS``, the result is a `point`.
+    true value in 95 to 98 % of cases with 5, 10 or 20 seeds. With fewer than ``LEAST_SEEDS``, both ends are NaN.
 
     Raises:
         ValueError: a side has fewer than 2 seeds, or an error is not finite.
@@ -295,7 +294,7 @@ def improvement_interval(ours: Array, theirs: Array, *, level: float = LEVEL) ->
             raise ValueError(f"an interval needs 2 or more seeds with finite errors, got {np.asarray(sample).tolist()}")
     n, m, share = len(ours), len(theirs), float(improvement(ours, theirs))
     if min(n, m) < LEAST_SEEDS:
-        return point(share)
+        return Interval(share)
     z = float(stats.norm.isf((1 - level) / 2))
 
     def excess(p: float) -> float:

@@ -39,7 +39,7 @@ with loading():  # Ctrl-C shows no traceback
     from sgimd_torch.figures.learning import COLOURS, NAMES
     from sgimd_torch.figures.save import save_figure
     from sgimd_torch.files import make_folder
-    from sgimd_torch.views.statistics import Interval, iqm_interval, rng
+    from sgimd_torch.views.statistics import Interval, bootstrap_rng, iqm_interval
 
 KIND: Final = "svg"
 ERROR: Final = "mean distance to the goals (m)"
@@ -104,7 +104,7 @@ def curves(ax: Axes, evidence: Evidence, variants: Mapping[str, str]) -> None:
     for algorithm, name in variants.items():
         curve = evidence.curve(name)
         movements = curve.columns
-        centre, low, high = np.array([iqm_interval(curve[at], rng=rng()) for at in movements]).T
+        centre, low, high = np.array([iqm_interval(curve[at], rng=bootstrap_rng()) for at in movements]).T
         ax.fill_between(movements, low, high, color=COLOURS[algorithm], alpha=0.2, linewidth=0)
         ax.plot(movements, centre, "o-", color=COLOURS[algorithm], markersize=4, label=NAMES[algorithm])
         ends[algorithm] = centre[-1]

@@ -13,7 +13,7 @@ from typing import Final
 from claimed import SUITE, on, paper
 from evidence import LAST, Evidence, NotRun, Statistic
 from judging import MISSING, Claim, Verdict, judge
-from sgimd_torch.views.statistics import show
+from sgimd_torch.views.statistics import interval_text
 from suite import TASKS, UNIFORM, titled
 from table import read_table
 from variants import ARMS, EXPERIMENTS, VARIANTS
@@ -108,7 +108,7 @@ class Page:
         except NotRun as missing:
             self.missing.append(str(missing))
             return MISSING_CELL
-        return show(number, form).replace("-", "−").replace("%", " %")
+        return interval_text(number, form).replace("-", "−").replace("%", " %")
 
     def claims(self, claims: Callable[[Evidence], Sequence[Claim]]) -> str:
         """A table with a row for each claim that has runs."""

@@ -20,7 +20,7 @@ from random_robots import COUNTS, FAMILIES, LEARNERS, NOISES, RANDOM, kind
 from robots import COMPARED, after_change, best, errors, harmful, over_anew, share
 from sgimd_torch.figures.names import COLOURS, NAMES
 from sgimd_torch.spaces import Array
-from sgimd_torch.views.statistics import Interval, iqm_interval, rng
+from sgimd_torch.views.statistics import Interval, bootstrap_rng, iqm_interval
 
 FACTORS: Final = np.geomspace(1, 8, 43)  # of a performance profile
 KINDS_AT: Final = 250
@@ -105,7 +105,7 @@ def simulator(evidence: Evidence) -> Figure:
     ax = figure.subplots()
     for (learner, name), colour in zip(BEGINNINGS.items(), ("random", "practice", "sagg-riac"), strict=True):
         by_seed = [after_change(evidence, ARM, SIMULATOR, learner, at).to_numpy() for at in BEGUN]
-        means = [iqm_interval(errors, rng=rng()) for errors in by_seed]
+        means = [iqm_interval(errors, rng=bootstrap_rng()) for errors in by_seed]
         _drawn(ax, BEGUN, means, COLOURS[colour], f"begun with {name}", "o-")
     ax.set(xscale="log", yscale="log", xlabel="movements on the real arm", ylabel="mean distance to the goals (m)")
     _ticks(ax, BEGUN)

@@ -19,7 +19,7 @@ from judging import Claim, Part, at_most
 from page_tables import MISSING_CELL, Page, markdown
 from random_robots import BASELINE, COUNTS, LEARNERS, RANDOM
 from sgimd_torch.figures.names import NAMES
-from sgimd_torch.views.statistics import LEVEL, Interval, interval, point, rng
+from sgimd_torch.views.statistics import LEVEL, Interval, bootstrap_rng, interval
 
 COMPARED: Final = tuple(name for name in LEARNERS if name != RANDOM)
 HARMFUL: Final = 1.02  # times the error of random movements; a larger error counts as harm
@@ -44,7 +44,7 @@ def errors(evidence: Evidence, at: int) -> pd.DataFrame:
 def share(which: pd.Series, *, level: Level = LEVEL) -> Interval:
     """The share of robots for which ``which`` is true, with Wilson's interval."""
     if level is None:
-        return point(float(which.mean()))
+        return Interval(float(which.mean()))
     between = stats.binomtest(int(which.sum()), len(which)).proportion_ci(level, "wilson")
     return Interval(float(which.mean()), between.low, between.high)
 
@@ -65,8 +65,8 @@ def over(evidence: Evidence, ours: str, theirs: str, at: int, *, level: Level = 
     table = errors(evidence, at)
     ratios = np.log(table[ours] / table[theirs]).to_numpy()
     if level is None:
-        return point(float(np.exp(ratios.mean())))
-    return interval(lambda drawn: np.exp(drawn.mean(axis=-1)), ratios, rng=rng(), level=level)
+        return Interval(float(np.exp(ratios.mean())))
+    return interval(lambda drawn: np.exp(drawn.mean(axis=-1)), ratios, rng=bootstrap_rng(), level=level)
 
 
 def any_robot(evidence: Evidence) -> list[Claim]:

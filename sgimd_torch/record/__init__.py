@@ -6,8 +6,8 @@
 `layout` has the tables, and ``docs/runs.md`` explains each column: settings and other facts (``about``), everything
 that happened (``events``), each demonstration once, and tables that a replay fills again (``DERIVED``).
 
-Every row ends in a checksum of itself, its number and its table, and the table ``about`` has the number of rows of each
-table. So reading raises an error if a row was changed, lost, doubled or moved.
+Every row ends in a checksum of itself and its number, and ``about`` has the number of rows of each table. So
+reading raises an error if a row was changed, lost, doubled or moved.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ class Record:
                 connection.execute("BEGIN IMMEDIATE")
                 for statement in _tables(dims).values():
                     connection.execute(statement)
-                rows = _with_checksums("about", 0, _about_rows({"dims": dims, **about}, n_rows))
+                rows = _with_checksums(_about_rows(about, n_rows))
                 connection.executemany("INSERT INTO about VALUES (?, ?, ?)", rows)
         except sqlite3.Error as error:
             raise OSError(f"{path} cannot be written: {error}") from error
@@ -126,7 +126,7 @@ class Record:
             while rows := self._connection.execute(next_rows, (number,)).fetchall():
                 for rowid, *row, checksum in rows:
                     number += 1
-                    if rowid != number or checksum != _checksum(table, number, row):
+                    if rowid != number or checksum != _checksum(number, row):
                         raise RunError(f"row {number} of {table} is not what was written; {HINT}")
                     yield tuple(row)
             if number != self._n_rows.get(table, number):
@@ -200,7 +200,7 @@ class Record:
 
     def _append(self, table: str, rows: Sequence[Row]) -> None:
         if rows:
-            complete = _with_checksums(table, self._n_rows[table], rows)
+            complete = _with_checksums(rows, self._n_rows[table])
             marks = ", ".join("?" * len(complete[0]))
             with self._translated_errors(writing=True):
                 self._connection.executemany(f"INSERT INTO {table} VALUES ({marks})", complete)
@@ -223,13 +223,13 @@ class Record:
         statements = dict(self._connection.execute("SELECT name, sql FROM sqlite_schema").fetchall())
         if not statements:
             raise RunError("it is still empty")
-        self.about: dict[str, Any] = {name: json.loads(value) for name, value in self.rows("about")}
-        self._n_rows = self.about.pop("rows")
-        c, p, t = self.about["dims"]
+        c, p, t = (statements.get("events", "").count(f" {name}_") for name in ("context", "theta", "outcome"))
         self.dims: Dims = c, p, t
         tables = _tables(self.dims)  # a viewer may have added an index, a view or statistics
         if {name: statements.get(name) for name in tables} != tables:
-            raise RunError(f"its tables are not those of a record; {HINT}")
+            raise RunError(f"its tables are not those of a record of this version; {HINT}")
+        self.about: dict[str, Any] = {name: json.loads(value) for name, value in self.rows("about")}
+        self._n_rows = self.about.pop("rows")
         last = self._connection.execute("SELECT movement, kind FROM events ORDER BY rowid DESC LIMIT 1").fetchone()
         self.movements = 0 if last is None else movements_after(*last)
 
@@ -293,10 +293,10 @@ def _as_bytes(row: Sequence[Any]) -> bytes:
     return marshal.dumps(tuple(row), 2)
 
 
-def _checksum(table: str, number: int, row: Sequence[Any]) -> int:
-    """The checksum of a row, which has this ``number`` in its ``table``, from 1."""
-    return zlib.crc32(_as_bytes((table, number, *row)))
+def _checksum(number: int, row: Sequence[Any]) -> int:
+    """The checksum of a row, which has this ``number`` in its table, from 1."""
+    return zlib.crc32(_as_bytes((number, *row)))
 
 
-def _with_checksums(table: str, n_before: int, rows: Iterable[Row]) -> list[Row]:
-    return [(*row, _checksum(table, number, row)) for number, row in enumerate(rows, n_before + 1)]
+def _with_checksums(rows: Iterable[Row], n_before: int = 0) -> list[Row]:
+    return [(*row, _checksum(number, row)) for number, row in enumerate(rows, n_before + 1)]

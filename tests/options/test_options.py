@@ -14,7 +14,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from runs import content_of
 from sgimd_torch.algorithms import families
 from sgimd_torch.figures.names import colour, label
 from sgimd_torch.options import command_line
@@ -29,31 +28,17 @@ from sgimd_torch.runs.tasks import MAX_GOALS, goals_all_over
 from sgimd_torch.session import run
 
 ENTRIES = [(kind, word) for kind, words in WORDS.items() for word in words]
-TOSS = '''
+TAUGHT = '''
 import numpy as np
-from sgimd_torch import Box, Demonstration, Goals
-from sgimd_torch.environments.protocol import check_movement
+from sgimd_torch import Demonstration, UniformGoals
 from sgimd_torch.runs.tasks import Task
-
-class Toss:
-    """theta: elevation and charge, both in [0, 1]; outcome: how far the ball flies (m)."""
-    contexts, policies, outcomes = Box.cube(0, 1, 0), Box.cube(0, 1, 2), Box.cube(0, 10, 1)
-    rest, outcome_noise = np.zeros(1), 0.05
-    def observe(self, rng):
-        return self.contexts.sample(rng)
-    def execute(self, context, theta, rng):
-        context, theta = check_movement(self, context, theta)
-        return np.array([10 * theta[1] * np.sin(np.pi * theta[0]) + rng.normal(0, 0.05)])
-
-def shown():
-    times = np.linspace(0, 1, 3)
-    return [Demonstration(np.empty(0), times, np.tile([0.5, charge], (3, 1)), np.array([10 * charge]))
-            for charge in (0.2, 0.5, 0.9)]
+from sliders import Slider
 
 def taught():
-    return Task(Toss(), demonstrations=shown, correspondence=lambda times, trajectory: trajectory[-1])
+    shown = [Demonstration(np.empty(0), np.arange(3), np.full((3, 1), place), [place]) for place in (0.2, 0.5, 0.9)]
+    return Task(Slider(), demonstrations=lambda: shown, correspondence=lambda times, trajectory: trajectory[-1])
 
-class Worst(Goals):
+class Worst(UniformGoals):
     """Goals anywhere.
 
     Args:
@@ -62,19 +47,9 @@ class Worst(Goals):
     def __init__(self, problem, *, window=8):
         super().__init__(problem)
         self.window = window
-    def sample(self, context):
-        return self.problem.outcomes.sample(self.rng)
-    def add(self, context, goal, competence, strategy="autonomous", gain=0.0):
-        pass
 '''
 PUCK, THROW = "experiments.toys:puck", "experiments.toys:toss"
 SHORT = ("--movements", "40", "--evaluate-at", "20", "--repeats", "2", "--inverse", "linear")
-
-
-@pytest.fixture
-def toss(module):
-    """A module of the user's, in the working directory."""
-    return module("toss", TOSS)
 
 
 @pytest.mark.parametrize(("kind", "word"), ENTRIES)
@@ -94,38 +69,25 @@ def test_algorithms_have_a_name_and_a_colour_and_unknown_ones_their_word():
     assert len({colour(word) for word in ("random", "sagg-riac", "observation", "imitation", "sgim-d")}) == 5
 
 
-def test_a_users_environment_is_run_evaluated_and_resumed(toss, capsys):
-    own = ("--environment", "toss:Toss", "--algorithm", "sagg-riac", "--out", "runs", *SHORT)
-    assert command(main, own) == 0
-    said = capsys.readouterr().err
-    assert "Toss has no benchmark goals" in said
-    run = read_run(toss / "runs/sagg-riac/seed-000")
-    assert run.outcomes.shape == (40, 1)
-    assert run.evaluation["movements"].tolist() == [20, 40]
-    whole = content_of(run.path)
-    assert command(main, [*own, "--name", "two", "--movements", "25"]) == 0
-    assert command(main, [*own, "--name", "two", "--resume"]) == 0
-    assert content_of(toss / "runs/two/seed-000") == whole
-
-
-def test_a_users_task_comes_with_its_teacher(toss, capsys):
-    taught = ("--algorithm", "sgim-d", "--environment", "toss:taught", "--out", "runs", *SHORT)
-    assert command(main, taught) == 0
-    run = read_run(toss / "runs/sgim-d/seed-000")
+def test_a_users_task_comes_with_its_teacher_and_without_goals(own, module, capsys):
+    module("lessons", TAUGHT)
+    assert command(main, ["--algorithm", "sgim-d", "--environment", "lessons:taught", "--out", "runs", *SHORT]) == 0
+    run = read_run(own / "runs/sgim-d/seed-000")
     assert np.flatnonzero(run.demonstration >= 0).tolist() == [30]
-    assert "3 demonstrations" in capsys.readouterr().err
+    assert run.evaluation["movements"].tolist() == [20, 40]
+    printed = capsys.readouterr().err
+    assert "3 demonstrations" in printed
+    assert "Slider has no benchmark goals" in printed
 
 
-def test_an_option_of_a_users_goal_model_is_its_parameter_and_nothing_else(toss, capsys):
-    own = Config("sagg-riac", parts={"environment": "toss:Toss", "goals": "toss:Worst", "goals.window": 4})
-    goals = build(own).learner.autonomous.goals
-    assert type(goals).__name__ == "Worst"
-    assert goals.window == 4
-    words_ = ["--algorithm", "sagg-riac", "--goals", "toss:Worst"]
+def test_an_option_of_a_users_goal_model_is_its_parameter_and_nothing_else(own, module, capsys):
+    module("lessons", TAUGHT)
+    parts = {"environment": "sliders:Slider", "goals": "lessons:Worst", "goals.window": 4}
+    goals = build(Config("sagg-riac", parts=parts)).learner.autonomous.goals
+    assert (type(goals).__name__, goals.window) == ("Worst", 4)
     with pytest.raises(SystemExit):
-        parse([*words_, "--help"])
-    said = capsys.readouterr().out
-    assert re.search(r"--goals.window .*\n? *number of goals .*default: 8", said), said
+        parse(["--algorithm", "sagg-riac", "--goals", "lessons:Worst", "--help"])
+    assert re.search(r"--goals.window .*\n? *number of goals .*default: 8", capsys.readouterr().out)
 
 
 def test_goals_all_over_a_space_are_at_most_500_and_inside():
