@@ -39,11 +39,16 @@ from suite import TASKS
 AFTER: Final = (100, 250, 500, 1000)  # movements after the change at which a learner is evaluated
 BEGUN: Final = (50, *AFTER)  # movements after a simulator
 GOALS: Final = 48  # largest number of goals of an evaluation
-GRADUAL, UNDONE = 2000, 500  # movements in which a gradual change grows; after which a change is undone
+GRADUAL: Final = 2000  # number of movements in which a gradual change grows
+UNDONE: Final = 500  # number of movements after which a change is undone
 ROBOTS: Final = {"planar-arm-7": 1000, "fishing-rod": 500, "toss": 1000, "crawler": 1000}  # movements before a change
 CHANGES: Final = ("offset-0.1", "offset-0.02", "gain", "stuck", "mirrored", "gradual", "undone", "noise")
-GOES_ON, ANEW, BLIND, WRONG = "goes-on", "anew", "blind", "wrong"  # learners; the blind one goes on and notices nothing
-ARM, SIMULATOR = "mujoco-arm", "simulator"  # the arm of docs/how-to/sim-to-real.md, and what changes there
+GOES_ON: Final = "goes-on"  # learner that goes on after a change
+ANEW: Final = "anew"  # learner that begins after the change
+BLIND: Final = "blind"  # learner that goes on and notices no change
+WRONG: Final = "wrong"  # learner that begins with a simulator that mirrors the outcomes
+ARM: Final = "mujoco-arm"  # the arm of docs/how-to/sim-to-real.md
+SIMULATOR: Final = "simulator"  # the change from the simulated arm to the real one
 SIMULATED: Final = 2000  # movements in the simulator
 SEEDS: Final = range(246, 252)
 TABLE: Final = "changes.csv"
@@ -127,15 +132,15 @@ def errors(
     learner: Learner, world: Environment, seed: int, goals: Array, start: int, counts: Collection[int]
 ) -> dict[int, tuple[float, int]]:
     """Mean error at the goals (unit of T), and changes noticed, by number of movements after the first ``start``."""
-    found = {}
+    errors_at = {}
     for episode in run(learner, world, seed, movements=start + max(counts)):
         made = episode.index + 1
         if isinstance(world, Changing):
             world.made = made
         if made - start in counts:
             evaluation = evaluate(learner.inverse, world, goals, 1, step=made, repeats=0)
-            found[made - start] = evaluation.mean_error, len(learner.changes)
-    return found
+            errors_at[made - start] = evaluation.mean_error, len(learner.changes)
+    return errors_at
 
 
 def after(robot: str) -> tuple[int, ...]:

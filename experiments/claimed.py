@@ -1,6 +1,6 @@
 """The claims of each page of results, each with its bar: first the claims of the paper, then ours.
 
-for verdict in judge(paper(found, letter=True)): print(verdict.claim, verdict.verdict)
+for verdict in judge(paper(evidence, letter=True)): print(verdict.claim, verdict.verdict)
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ from variants import ARMS, FOUR, HALVES, ROD, SPARSE, VARIANTS
 TIMES: Final = (250, 500, 1000, 2000)
 WHOLE: Final = (*TIMES, LAST)
 SUITE: Final = tuple(task for task in TASKS if task not in SPARSE)
-EVERY, COST = 30, 10  # movements between two demonstrations of SGIM-D; cost of a demonstration (movements)
+EVERY: Final = 30  # number of movements between two demonstrations of SGIM-D
+COST: Final = 10  # cost of a demonstration, in movements
 
 
 def on(name: str, task: str) -> str:
@@ -28,18 +29,18 @@ def on(name: str, task: str) -> str:
     return name if task == ROD else f"{name}.{task}"
 
 
-def less(found: Evidence, ours: str, theirs: str, *times: int, name: str = "") -> list[Part]:
+def less(evidence: Evidence, ours: str, theirs: str, *times: int, name: str = "") -> list[Part]:
     """Parts of a claim, one for each number of movements in ``times``: our error is smaller than theirs."""
     names = {at: f"{name} at {at}".strip() if len(times) > 1 else name for at in times or (LAST,)}
-    return [at_most(0.0, found.difference, ours, theirs, at, name=each, form="+.4f") for at, each in names.items()]
+    return [at_most(0.0, evidence.difference, ours, theirs, at, name=label, form="+.4f") for at, label in names.items()]
 
 
-def times_as_much(found: Evidence, bar: float, ours: str, theirs: str, *times: int) -> list[Part]:
+def times_as_much(evidence: Evidence, bar: float, ours: str, theirs: str, *times: int) -> list[Part]:
     """Parts of a claim, one for each number of movements in ``times``: our error is at most ``bar`` times theirs."""
-    return [at_most(bar, found.ratio, ours, theirs, at, name=f"at {at}") for at in times]
+    return [at_most(bar, evidence.ratio, ours, theirs, at, name=f"at {at}") for at in times]
 
 
-def paper(found: Evidence, *, letter: bool) -> list[Claim]:
+def paper(evidence: Evidence, *, letter: bool) -> list[Claim]:
     """Claims of section 6 of the paper, on learners by the ``letter`` of the paper, or else on our learners.
 
     For learners by the letter, eq. (9) answers. Unless a claim says otherwise, it is about 5000 movements, with a
@@ -52,7 +53,7 @@ def paper(found: Evidence, *, letter: bool) -> list[Claim]:
     random, sgim_d, sagg_riac = "random", our("sgim-d"), our("sagg-riac")
     imitation, observation = our("imitation"), our("observation")
     best = [
-        at_least(0.95, found.improvement, sgim_d, other, margin=0.2, name=name)
+        at_least(0.95, evidence.improvement, sgim_d, other, margin=0.2, name=name)
         for name, other in (("Random", random), ("SAGG-RIAC", sagg_riac), ("Observation", observation),
                             ("Imitation", imitation))
     ]  # fmt: skip
@@ -60,63 +61,68 @@ def paper(found: Evidence, *, letter: bool) -> list[Claim]:
         part
         for number, where in ((1, "-teacher-1"), (2, "-teacher-2"), (3, ""))
         for name, other in (("SAGG-RIAC", sagg_riac), ("Imitation", our("imitation", where)))
-        for part in less(found, our("sgim-d", where), other, name=f"{name}, demonstrator {number}")
+        for part in less(evidence, our("sgim-d", where), other, name=f"{name}, demonstrator {number}")
     ]
     large, sagg_riac_large = our("sgim-d", "-large"), our("sagg-riac", "-large")
     return [
-        Claim("Observation has the largest error: Random − Observation < 0", less(found, random, observation),
+        Claim("Observation has the largest error: Random − Observation < 0", less(evidence, random, observation),
               "With `process`, watched demonstrations give answers about as good as random movements do."),
         Claim("The error of SAGG-RIAC is clearly smaller than that of Random: ratio ≤ 0.85",
-              [at_most(0.85, found.ratio, sagg_riac, random)], "Choosing goals reduces the error."),
+              [at_most(0.85, evidence.ratio, sagg_riac, random)], "Choosing goals reduces the error."),
         Claim("... from the beginning: difference < 0 at 250, 500, 1000",
-              less(found, sagg_riac, random, 250, 500, 1000), "At first SAGG-RIAC has tried only few goals."),
-        Claim("The error of Imitation is smaller than that of Random: difference < 0", less(found, imitation, random),
+              less(evidence, sagg_riac, random, 250, 500, 1000), "At first SAGG-RIAC has tried only few goals."),
+        Claim("The error of Imitation is smaller than that of Random: difference < 0",
+              less(evidence, imitation, random),
               "Demonstrations reduce the error."),
         Claim("... about as large as that of SAGG-RIAC: ratio 0.80 to 1.25",
-              [at_most(1.25, found.ratio, imitation, sagg_riac), at_least(0.8, found.ratio, imitation, sagg_riac)],
+              [at_most(1.25, evidence.ratio, imitation, sagg_riac),
+               at_least(0.8, evidence.ratio, imitation, sagg_riac)],
               "With `process`, the error of Imitation tends to be smaller."),
         Claim("... and varies less over seeds: ratio of variances ≤ 0.50",
-              [at_most(0.5, found.variance_ratio, imitation, sagg_riac)], "A teacher makes seeds more alike."),
+              [at_most(0.5, evidence.variance_ratio, imitation, sagg_riac)], "A teacher makes seeds more alike."),
         Claim("SGIM-D has the smallest error: probability of improvement over each of the four others ≥ 0.95, "
               "intervals above 0.75", best, "It has with every seed; this bar needs more seeds."),
         Claim("SGIM-D halves the error of Random: ratio ≤ 0.50, interval up to 0.55",
-              [at_most(0.5, found.ratio, sgim_d, random, margin=0.05)], "The answers of eq. (9) are coarse."),
+              [at_most(0.5, evidence.ratio, sgim_d, random, margin=0.05)], "The answers of eq. (9) are coarse."),
         Claim("... its error comes near its noise floor: ratio ≤ 1.25",
-              [at_most(1.25, found.over_floor, sgim_d, sgim_d)], "A part of the error comes from the inverse model."),
+              [at_most(1.25, evidence.over_floor, sgim_d, sgim_d)],
+              "A part of the error comes from the inverse model."),
         Claim("... it reaches the last error of Random in less than 1000 movements",
-              [at_most(np.nextafter(1000, 0), found.time_to_reach, sgim_d, random, form=".0f")],
+              [at_most(np.nextafter(1000, 0), evidence.time_to_reach, sgim_d, random, form=".0f")],
               "Teaching helps early."),
         Claim("SAGG-RIAC reaches more benchmark tiles than Random",
-              [at_least(0, found.more_tiles, sagg_riac, random, form="+.0f")], "Goals widen the reached part of T."),
-        Claim("... and SGIM-D more than SAGG-RIAC", [at_least(0, found.more_tiles, sgim_d, sagg_riac, form="+.0f")],
+              [at_least(0, evidence.more_tiles, sagg_riac, random, form="+.0f")], "Goals widen the reached part of T."),
+        Claim("... and SGIM-D more than SAGG-RIAC", [at_least(0, evidence.more_tiles, sgim_d, sagg_riac, form="+.0f")],
               "Our SGIM-D stays near the demonstrated outcomes."),
         Claim("With each of three demonstrators, the error of SGIM-D is smaller than those of SAGG-RIAC and Imitation: "
               "six differences < 0", taught, "With the careful demonstrator 2, Imitation is as good."),
         Claim("Demonstrator 3 is better for SGIM-D than 2, and 2 is better than 1: two differences < 0",
-              [*less(found, sgim_d, our("sgim-d", "-teacher-2"), name="3 and 2"),
-               *less(found, our("sgim-d", "-teacher-2"), our("sgim-d", "-teacher-1"), name="2 and 1")],
+              [*less(evidence, sgim_d, our("sgim-d", "-teacher-2"), name="3 and 2"),
+               *less(evidence, our("sgim-d", "-teacher-2"), our("sgim-d", "-teacher-1"), name="2 and 1")],
               "Structured demonstrations help most, careful ones second."),
         Claim("Demonstrators 1 and 2 are better for Observation than 3: two differences < 0",
               [part for number in (1, 2)
-               for part in less(found, our("observation", f"-teacher-{number}"), observation, name=f"{number} and 3")],
+               for part in less(evidence, our("observation", f"-teacher-{number}"), observation,
+                                name=f"{number} and 3")],
               "Only demonstrator 2 is better."),
         Claim("T 10⁴ times larger: the error of SAGG-RIAC is still smaller than that of Random",
-              less(found, sagg_riac_large, random), "Nearly all goals of SAGG-RIAC are out of reach."),
+              less(evidence, sagg_riac_large, random), "Nearly all goals of SAGG-RIAC are out of reach."),
         Claim("... the error of SAGG-RIAC grows more than that of SGIM-D: ratio of ratios > 1",
-              [at_least(1.0, found.growth_ratio, (sagg_riac, sagg_riac_large), (sgim_d, large))],
+              [at_least(1.0, evidence.growth_ratio, (sagg_riac, sagg_riac_large), (sgim_d, large))],
               "The teacher shows SGIM-D the part within reach."),
         Claim("... the error of SGIM-D is little larger than in the small T: ratio ≤ 1.20",
-              [at_most(1.2, found.ratio, large, sgim_d)], "The error is about a fifth larger."),
+              [at_most(1.2, evidence.ratio, large, sgim_d)], "The error is about a fifth larger."),
         Claim("... and smaller than those of SAGG-RIAC and Random: two differences < 0",
-              [*less(found, large, sagg_riac_large, name="SAGG-RIAC"), *less(found, large, random, name="Random")],
+              [*less(evidence, large, sagg_riac_large, name="SAGG-RIAC"),
+               *less(evidence, large, random, name="Random")],
               "The error is much smaller."),
         Claim("... because SGIM-D chooses goals within reach: share of such goals ≥ 10 times that of SAGG-RIAC",
-              [at_least(10, found.near_ratio, large, sagg_riac_large, form=".0f")],
+              [at_least(10, evidence.near_ratio, large, sagg_riac_large, form=".0f")],
               "Our interest finds the part that can be reached."),
     ]  # fmt: skip
 
 
-def learning(found: Evidence) -> list[Claim]:
+def learning(evidence: Evidence) -> list[Claim]:
     """Claims on learning from few movements, first on the rod, then on the suite."""
     taught, alone = "practice-taught", "practice"
     rivals = ("sgim-d", "cma-mae-taught", "map-elites-taught", "uniform-nearest-taught")
@@ -124,43 +130,43 @@ def learning(found: Evidence) -> list[Claim]:
     tasks = [(task, at) for task in TASKS for at in TIMES]
 
     def same_schedule(ours: str, ending: str) -> list[Part]:
-        return [part for name in rivals for part in less(found, ours, f"{name}{ending}", *early_and_late, name=name)]
+        return [part for name in rivals for part in less(evidence, ours, f"{name}{ending}", *early_and_late, name=name)]
 
     def on_each_task(theirs: str, bar: float) -> list[Part]:
         return [
-            at_most(bar, found.ratio, on(alone, task), on(theirs, task), at, name=f"{task} at {at}")
+            at_most(bar, evidence.ratio, on(alone, task), on(theirs, task), at, name=f"{task} at {at}")
             for task, at in tasks
         ]
 
     def over_tasks(theirs: str, bar: float, *times: int) -> list[Part]:
         known = [task for task in SUITE if on(theirs, task) in VARIANTS]
         names = [[on(name, task) for task in known] for name in (alone, theirs)]
-        return [at_most(bar, found.over_tasks, *names, at, name=f"{theirs} at {at}") for at in times]
+        return [at_most(bar, evidence.over_tasks, *names, at, name=f"{theirs} at {at}") for at in times]
 
     return [
         Claim("`practice-taught` has a small error early: ≤ 0.105, 0.070, 0.046 m at 250, 500, 1000",
-              [at_most(bar, found.error, taught, at, name=f"at {at}", form=".4f")
+              [at_most(bar, evidence.error, taught, at, name=f"at {at}", form=".4f")
                for at, bar in ((250, 0.105), (500, 0.070), (1000, 0.046))]),
-        Claim("... and late: ≤ 0.0325 m at 5000", [at_most(0.0325, found.error, taught, form=".4f")]),
+        Claim("... and late: ≤ 0.0325 m at 5000", [at_most(0.0325, evidence.error, taught, form=".4f")]),
         Claim("... ≤ 1.03 times its noise floor",
-              [at_most(1.03, found.over_floor, taught, taught)]),
+              [at_most(1.03, evidence.over_floor, taught, taught)]),
         Claim("... smaller than SGIM-D and three rivals if all get all demonstrations at the start: < 0 at 250, 500, "
               "1000, 5000", same_schedule(taught, "-once")),
         Claim("... and if all get a demonstration every 30 movements: < 0 at 250, 500, 1000, 5000",
               same_schedule("practice-taught-every-30", "")),
         Claim("... with demonstrations in one corner only, no larger than without: ≤ 1.03 times, 250 to 5000",
-              times_as_much(found, 1.03, "practice-corner", alone, *WHOLE)),
+              times_as_much(evidence, 1.03, "practice-corner", alone, *WHOLE)),
         Claim("`practice`, without a teacher, has a smaller error than CMA-MAE: < 0 at 1000, 2000, 5000",
-              less(found, alone, "cma-mae", 1000, 2000, LAST)),
+              less(evidence, alone, "cma-mae", 1000, 2000, LAST)),
         Claim("... hardly a larger error in a T with sides 100 times longer: ≤ 1.15 times, 500 to 2000",
-              times_as_much(found, 1.15, "practice.rod-large", alone, *TIMES[1:])),
+              times_as_much(evidence, 1.15, "practice.rod-large", alone, *TIMES[1:])),
         Claim("... on `puck`, where most movements do nothing, ≤ 0.60 times the error of random movements at 2000",
-              times_as_much(found, 0.6, "practice.puck", "random.puck", 2000)),
+              times_as_much(evidence, 0.6, "practice.puck", "random.puck", 2000)),
         Claim("... on `puck` and `fetch` a smaller error than SAGG-RIAC and the standard baseline: < 0 at 2000",
               [part for task in SPARSE for name in ("sagg-riac", UNIFORM)
-               for part in less(found, f"practice.{task}", f"{name}.{task}", 2000, name=f"{name}, {task}")]),
+               for part in less(evidence, f"practice.{task}", f"{name}.{task}", 2000, name=f"{name}, {task}")]),
         Claim("SGIM-D has a smaller error than the standard baseline if both get a demonstration every 30 movements: "
-              "< 0 at 5000", less(found, "sgim-d", "uniform-nearest-taught")),
+              "< 0 at 5000", less(evidence, "sgim-d", "uniform-nearest-taught")),
         Claim("Suite: `practice` never has a larger error than random movements: ≤ 1.02 times, 250 to 2000",
               on_each_task("random", 1.02)),
         Claim("... nor than the standard baseline: ≤ 1.05 times", on_each_task(UNIFORM, 1.05)),
@@ -169,82 +175,82 @@ def learning(found: Evidence) -> list[Claim]:
         Claim("... and than CMA-MAE and MAP-Elites: mean ratios < 1 at 500, 1000, 2000",
               [part for name in ("cma-mae", "map-elites") for part in over_tasks(name, 1.0, 500, 1000, 2000)]),
         Claim("... on no task a larger error at 2000 than at 500",
-              [at_most(1.0, found.growth, on(alone, task), 2000, 500, name=task) for task in TASKS]),
+              [at_most(1.0, evidence.growth, on(alone, task), 2000, 500, name=task) for task in TASKS]),
     ]  # fmt: skip
 
 
-def curiosity(found: Evidence) -> list[Claim]:
+def curiosity(evidence: Evidence) -> list[Claim]:
     """Claims on what choosing goals gains over choosing movements, and what interest gains over uniform goals."""
     return [
         Claim("Choosing goals instead of movements: SAGG-RIAC − Random < 0",
-              less(found, "sagg-riac", "random")),
+              less(evidence, "sagg-riac", "random")),
         Claim("Interest in the small T, nearly all within reach: SGIM-D − SGIM-D with uniform goals < 0",
-              less(found, "sgim-d", "sgim-d-uniform")),
+              less(evidence, "sgim-d", "sgim-d-uniform")),
         Claim("Interest in a T 10⁴ times larger, by our definition: SGIM-D − SGIM-D with uniform goals < 0",
-              less(found, "sgim-d-large", "sgim-d-uniform-large")),
+              less(evidence, "sgim-d-large", "sgim-d-uniform-large")),
         Claim("... by the paper's eq. (3): the same difference < 0",
-              less(found, "sgim-d-absolute-large", "sgim-d-uniform-large")),
+              less(evidence, "sgim-d-absolute-large", "sgim-d-uniform-large")),
         Claim("Interest and simplex in this T: SGIM-D − the standard baseline < 0, both with a demonstration every 30 "
-              "movements", less(found, "sgim-d-large", "uniform-nearest-taught-large")),
+              "movements", less(evidence, "sgim-d-large", "uniform-nearest-taught-large")),
         Claim("Interest instead of goals within reach in `practice`: < 0 at 1000, 5000",
-              less(found, "practice-interest", "practice", 1000, LAST)),
+              less(evidence, "practice-interest", "practice", 1000, LAST)),
     ]  # fmt: skip
 
 
-def model(found: Evidence) -> list[Claim]:
+def model(evidence: Evidence) -> list[Claim]:
     """Claims on SGIM-D with a forward model instead of `process`: one proves itself first, one answers untested."""
     proved, untested, plain = "sgim-d-model by model", "sgim-d-model-alone by model-alone", "sgim-d"
     on_arms = [
-        at_most(1.03, found.ratio, f"sgim-d-model.{arm} by model", f"sgim-d.{arm}", at, name=f"{arm} at {at}")
+        at_most(1.03, evidence.ratio, f"sgim-d-model.{arm} by model", f"sgim-d.{arm}", at, name=f"{arm} at {at}")
         for arm in ARMS
         for at in TIMES
     ]
     return [
         Claim("`--inverse model`: the error of SGIM-D is ≤ 0.055, 0.042, 0.0365 m at 1000, 2000, 5000",
-              [at_most(bar, found.error, proved, at, name=f"at {at}", form=".4f")
+              [at_most(bar, evidence.error, proved, at, name=f"at {at}", form=".4f")
                for at, bar in ((1000, 0.055), (2000, 0.042), (LAST, 0.0365))]),
         Claim("... never much larger than with `process`: ≤ 1.03 times, on the rod at 250 to 5000, on arms of 7 and 50 "
-              "joints at 250 to 2000", [*times_as_much(found, 1.03, proved, plain, *WHOLE), *on_arms]),
+              "joints at 250 to 2000", [*times_as_much(evidence, 1.03, proved, plain, *WHOLE), *on_arms]),
         Claim("A model that answers untested reaches the last error of SGIM-D in ≤ 3000 movements",
-              [at_most(3000, found.time_to_reach, untested, plain, form=".0f")]),
+              [at_most(3000, evidence.time_to_reach, untested, plain, form=".0f")]),
         Claim("... has a smaller error than SGIM-D: < 0 at 1000, 2000, 5000",
-              less(found, untested, plain, 1000, 2000, LAST)),
+              less(evidence, untested, plain, 1000, 2000, LAST)),
         Claim("... at 5000 an error below the noise floor of SGIM-D",
-              [at_most(1.0, found.over_floor, untested, plain)]),
+              [at_most(1.0, evidence.over_floor, untested, plain)]),
     ]  # fmt: skip
 
 
-def asking(found: Evidence) -> list[Claim]:
+def asking(evidence: Evidence) -> list[Claim]:
     """Claims on learners that ask: when, how often, whom and where they ask, and at which cost."""
     im, dear, sgim_d, toss = "sgim-im", "sgim-im-cost-10", "sgim-d", "sgim-im.toss"
 
     def asked(name: str, what: str, teachers: Sequence[str] = ()) -> pd.Series:
-        return found.counts("asked", name, what, teachers)
+        return evidence.counts("asked", name, what, teachers)
 
     def late(name: str, what: str, of: Sequence[str], among: Sequence[str], *, level: Level = LEVEL) -> Interval:
-        return found.share(asked(name, what, of), asked(name, "late", among), level=level)
+        return evidence.share(asked(name, what, of), asked(name, "late", among), level=level)
 
     def more(what: str, name: str, than: str, other: str, *, level: Level = LEVEL) -> Interval:
-        return found.less(asked(name, what), asked(other, than), level=level)
+        return evidence.less(asked(name, what), asked(other, than), level=level)
 
     def at_equal_cost(*, level: Level = LEVEL) -> Interval:
         """Our error minus that of SGIM-D at equal cost; errors of SGIM-D are interpolated between its evaluations."""
-        ours, shown = shared(found.at(dear), asked(dear, "shown"))
-        costs, curve = shared((LAST + COST * shown) / (1 + COST / EVERY), found.curve(sgim_d))
+        ours, replies = shared(evidence.at(dear), asked(dear, "shown"))
+        costs, curve = shared((LAST + COST * replies) / (1 + COST / EVERY), evidence.curve(sgim_d))
         theirs = pd.Series({seed: np.interp(costs[seed], curve.columns, curve.loc[seed]) for seed in costs.index})
-        return found.less(ours, theirs, level=level)
+        return evidence.less(ours, theirs, level=level)
 
     return [
         Claim("When to ask: SGIM-IM has a smaller error than SGIM-D with a demonstration every 30: < 0 at 1000",
-              less(found, im, sgim_d, 1000)),
+              less(evidence, im, sgim_d, 1000)),
         Claim("... no larger error than SGIM-D with all 127 demonstrations at the start: ≤ 0 at 5000",
-              less(found, im, "sgim-d-initial")),
-        Claim("... nor than `practice-taught` with all 127 at the start", less(found, im, "practice-taught")),
+              less(evidence, im, "sgim-d-initial")),
+        Claim("... nor than `practice-taught` with all 127 at the start", less(evidence, im, "practice-taught")),
         Claim("How many: with 83 demonstrations to ask for, SGIM-IM has no larger error than SGIM-D with 127",
-              less(found, "sgim-im-83", sgim_d)),
+              less(evidence, "sgim-im-83", sgim_d)),
         Claim("Whom to ask: SGIM-ACTS learns from four teachers, one of whom mislabels, as well as from each of the "
               "other three alone: ratios ≤ 1.05",
-              [at_most(1.05, found.ratio, "sgim-acts-four", name, name=f"teacher {k}")
+              [at_most(1.05, evidence.ratio, "sgim-acts-four", name, name=f"teacher {k}")
                for k, name in enumerate(("sgim-acts-1", "sgim-acts-2", im), 1)]),  # teacher 3 is that of SGIM-IM
         Claim("... and seldom asks the teacher who mislabels: ≤ 10 % of the requests after 1000",
               [at_most(0.1, late, "sgim-acts-four", "late", ("mislabelling",), FOUR)]),
@@ -255,8 +261,8 @@ def asking(found: Evidence) -> list[Claim]:
         Claim("... and has a smaller error than SGIM-D at equal total cost",
               [at_most(0, at_equal_cost, form="+.4f")]),
         Claim("Contexts: on the toss SGIM-IM has a smaller error than a learner to which the wind is hidden: < 0 at "
-              "1000, 2000", less(found, toss, "practice.toss-blind", 1000, 2000)),
-        Claim("... a smaller error than without a teacher", less(found, toss, "practice.toss", 1000, 2000)),
+              "1000, 2000", less(evidence, toss, "practice.toss-blind", 1000, 2000)),
+        Claim("... a smaller error than without a teacher", less(evidence, toss, "practice.toss", 1000, 2000)),
         Claim("... and asks more often in a strong wind than in a weak wind",
               [at_most(0, more, "weak", toss, "strong", toss, form="+.0f")]),
     ]  # fmt: skip

@@ -34,14 +34,15 @@ README: Final = "README"
 TEMPLATES: Final = Path(__file__).with_name("pages")
 PAGES: Final = sorted(path.name.partition(".")[0] for path in TEMPLATES.glob("*.md.j2"))
 MADE: Final = "<!-- Made by experiments/claims.py"
-BEGIN, END = "<!-- results: made by experiments/claims.py from experiments/pages/README.md.j2 -->", "<!-- end -->"
+BEGIN: Final = "<!-- results: made by experiments/claims.py from experiments/pages/README.md.j2 -->"  # of the section
+END: Final = "<!-- end -->"  # of the section
 
 
-def filled(name: str, found: Evidence, folder: Path) -> tuple[str, Page]:
+def filled(name: str, evidence: Evidence, folder: Path) -> tuple[str, Page]:
     """The text of a template filled with tables and numbers, and the `Page` that has made them."""
     loader = jinja2.FileSystemLoader(TEMPLATES)
     environment = jinja2.Environment(loader=loader, undefined=jinja2.StrictUndefined, keep_trailing_newline=True)
-    page = Page(found, folder)
+    page = Page(evidence, folder)
     return environment.get_template(f"{name}.md.j2").render(page=page, claimed=claimed, robots=robots), page
 
 
@@ -79,17 +80,17 @@ def main(argv: Sequence[str] | None = None) -> int:
     paths = {name: Path("README.md") if name == README else options.out / f"{name}.md" for name in names}
     for name in {*names} - {README}:
         _check_place(paths[name])
-    found, texts = Evidence.of(options.results), dict[Path, str]()
+    evidence, texts = Evidence.of(options.results), dict[Path, str]()
     for name in names:
-        text, page = filled(name, found, options.results)
+        text, page = filled(name, evidence, options.results)
         if name == README:
             text = into_readme(paths[name].read_text(encoding="utf-8"), text)
         else:
             text = f"{MADE} from experiments/pages/{name}.md.j2; change that file, not this one. -->\n\n{text}"
         texts[paths[name]] = text
-        verdicts = [each.verdict for each in page.verdicts]
+        verdicts = [verdict.verdict for verdict in page.verdicts]
         print(
-            f"{name}: {', '.join(f'{verdicts.count(each)} {each}' for each in dict.fromkeys(verdicts)) or 'no claims'}"
+            f"{name}: {', '.join(f'{verdicts.count(word)} {word}' for word in dict.fromkeys(verdicts)) or 'no claims'}"
         )
         if page.missing:
             say(f"{name}: not run: {'; '.join(dict.fromkeys(page.missing))}")

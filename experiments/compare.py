@@ -49,7 +49,7 @@ examples:
 
 Exit code: 0 all runs are in the tables, 1 some failed, 2 the request is wrong, 130 or 143 stopped by a signal.
 """
-RUN: Final = ["variant", "seed", "movements", "answer"]
+KEY: Final = ["variant", "seed", "movements", "answer"]
 NUMBERS: Final = ["error", "floor"]
 ROUNDING: Final = 1e-5  # relative difference that rounding on another processor may cause over thousands of movements
 
@@ -66,7 +66,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     table = read_table(options.results)
     if options.verify:
         return verify(wanted, table, options)
-    known = {*table[RUN].itertuples(index=False, name=None)}
+    known = {*table[KEY].itertuples(index=False, name=None)}
     left = [config for config in wanted if not last_rows(config) <= known]
     where = options.results / FILE
     say(f"{len(wanted)} runs{options.shard.note(whole)}, {len(wanted) - len(left)} of them in {where} already")
@@ -111,7 +111,7 @@ def verify(wanted: Sequence[Config], table: pd.DataFrame, options: argparse.Name
     verdicts = []
     for row, config in zip(drawn, again, strict=True):
         made = result_rows(config, read_run(config.directory)) if finished(config) else []
-        now = next((each for each in made if each["answer"] == row["answer"]), {})
+        now = next((other for other in made if other["answer"] == row["answer"]), {})
         verdicts.append(compared(row, now))
         print(f"{verdicts[-1]:8} {_in_words(row)}" + ("" if verdicts[-1] == "equal" else f"  now {_in_words(now)}"))
     counts = [verdicts.count(verdict) for verdict in ("equal", "rounding", "DIFFERS")]
@@ -121,12 +121,12 @@ def verify(wanted: Sequence[Config], table: pd.DataFrame, options: argparse.Name
 
 def compared(shipped: Row, now: Row) -> str:
     """Verdict on two rows: "equal", "rounding" if they differ by rounding errors alone, or "DIFFERS"."""
-    if {name: shipped[name] for name in RUN} != {name: now.get(name) for name in RUN}:
+    if {name: shipped[name] for name in KEY} != {name: now.get(name) for name in KEY}:
         return "DIFFERS"
-    then, found = (np.array([row[name] for name in NUMBERS], dtype=np.float64) for row in (shipped, now))
-    if np.array_equal(then, found, equal_nan=True):
+    old, new = (np.array([row[name] for name in NUMBERS], dtype=np.float64) for row in (shipped, now))
+    if np.array_equal(old, new, equal_nan=True):
         return "equal"
-    return "rounding" if np.allclose(found, then, rtol=ROUNDING, atol=0, equal_nan=True) else "DIFFERS"
+    return "rounding" if np.allclose(new, old, rtol=ROUNDING, atol=0, equal_nan=True) else "DIFFERS"
 
 
 def runs_of(experiments: Sequence[str], only: Sequence[str], seeds: Sequence[int] | None, out: Path) -> list[Config]:
@@ -138,7 +138,7 @@ def runs_of(experiments: Sequence[str], only: Sequence[str], seeds: Sequence[int
         seeds: seeds of each variant; None for the seeds of its page.
         out: folder of the runs; ``out/demonstrations`` has the files of ``make_subsets``.
     """
-    found = []
+    configs = []
     for seed in sorted({*chain(*SEEDS.values())}) if seeds is None else seeds:
         for experiment in experiments:
             if seeds is None and seed not in SEEDS[experiment]:
@@ -150,8 +150,8 @@ def runs_of(experiments: Sequence[str], only: Sequence[str], seeds: Sequence[int
                 if run.get("demonstrations") in MADE:
                     run["demonstrations"] = out / "demonstrations" / run["demonstrations"]
                 config = Config.from_settings(run)
-                found.append(replace(config, evaluated_by=answers_of(config)))
-    return found
+                configs.append(replace(config, evaluated_by=answers_of(config)))
+    return configs
 
 
 def last_rows(config: Config) -> set[tuple[Any, ...]]:
@@ -212,7 +212,7 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
     for name in options.experiments:
         _check_known("experiment", name, EXPERIMENTS)
     for name in options.only:
-        _check_known("variant", name, [*chain(*(EXPERIMENTS[each] for each in options.experiments))])
+        _check_known("variant", name, [*chain(*(EXPERIMENTS[experiment] for experiment in options.experiments))])
     return options
 
 

@@ -1,6 +1,6 @@
 """The evidence of the tables of results: errors by seed, and statistics over seeds for claims, tables and figures.
 
-    found = Evidence.of(Path("results")); show(found.ratio("sgim-d", "random"))
+    evidence = Evidence.of(Path("results")); interval_text(evidence.ratio("sgim-d", "random"))
 A name is that of a variant, whose errors are those with the inverse model `process`; "sgim-d-letter by paper" names
 another inverse model. Two names, "ours" and "theirs", are compared on their common seeds. If no seed is common, they
 are compared as independent samples.
@@ -23,10 +23,9 @@ from sgimd_torch.views.statistics import (
     LEAST_SEEDS,
     LEVEL,
     Interval,
+    bootstrap_rng,
     interquartile_mean,
     interval,
-    point,
-    rng,
 )
 from table import read_table
 
@@ -74,8 +73,8 @@ class Evidence:
         """Errors (m) by seed after a number of movements; noise floors (m) if the column is "floor"."""
         variant, _, answer = name.partition(" by ")
         place = (answer or "process", variant, movements)
-        found = self.rows.loc[place, column].dropna() if place in self.rows.index else pd.Series(dtype=float)
-        return _two_or_more(found, f"{name} at {movements}")
+        errors = self.rows.loc[place, column].dropna() if place in self.rows.index else pd.Series(dtype=float)
+        return _two_or_more(errors, f"{name} at {movements}")
 
     def curve(self, name: str) -> pd.DataFrame:
         """Errors (m): a row for each seed, a column for each number of movements; incomplete seeds are left out."""
@@ -168,8 +167,8 @@ class Evidence:
 
     def near_share(self, name: str, *, level: Level = LEVEL) -> Interval:
         """The share of chosen goals that can be reached, over the goals of all seeds."""
-        found = self.near_goals(name)
-        return self.share(found["near"], found["goals"], level=level)
+        goals = self.near_goals(name)
+        return self.share(goals["near"], goals["goals"], level=level)
 
     def near_ratio(self, ours: str, theirs: str, *, level: Level = LEVEL) -> Interval:
         """Our share of goals that can be reached divided by theirs, each over the goals of all seeds.
@@ -241,8 +240,8 @@ def movements_to_reach(movements: Array, errors: Array, level: Array | float) ->
     high, low = (np.take_along_axis(errors, after - step, axis=-1) for step in (1, 0))
     fall = np.where(high > low, high - low, 1.0)
     share = np.clip((high - level) / fall, 0, 1)  # 0 if the error at the first evaluation is low enough
-    found = movements[after - 1] + share * (movements[after] - movements[after - 1])
-    return np.where(reached.any(axis=-1), found[..., 0], np.inf)
+    times = movements[after - 1] + share * (movements[after] - movements[after - 1])
+    return np.where(reached.any(axis=-1), times[..., 0], np.inf)
 
 
 def _matched(ours: pd.Series, theirs: pd.Series) -> tuple[pd.Series, pd.Series, bool]:
@@ -256,16 +255,16 @@ def _ratio(x: Array, y: Array) -> Array:
 
 
 def _found(statistic: Callable[..., Array], *of: ArrayLike, level: Level, paired: bool = False) -> Interval:
-    samples = [np.asarray(each, dtype=np.float64) for each in of]
+    samples = [np.asarray(sample, dtype=np.float64) for sample in of]
     if level is None:
-        return point(float(statistic(*samples)))
-    return interval(statistic, *samples, rng=rng(), paired=paired, level=level)
+        return Interval(float(statistic(*samples)))
+    return interval(statistic, *samples, rng=bootstrap_rng(), paired=paired, level=level)
 
 
-def _two_or_more(found: pd.Series, what: str) -> pd.Series:
-    if len(found) < 2:
+def _two_or_more(values: pd.Series, what: str) -> pd.Series:
+    if len(values) < 2:
         raise NotRun(what)
-    return found
+    return values
 
 
 def improvement(ours: Array, theirs: Array) -> Array:
@@ -285,7 +284,7 @@ def improvement_interval(ours: Array, theirs: Array, *, level: float = LEVEL) ->
     Wilson's interval for this statistic has all probabilities that the data do not reject (Newcombe 2006, Statistics in
     Medicine 25:559, method 5). If all our errors are smaller than all of theirs, the interval is [.80, 1] with 10 seeds
     and [.90, 1] with 20; a bootstrap would give [1, 1] even with 2 seeds. If errors are normal, the interval has the
-    true value in 95 to 98 % of cases with 5, 10 or 20 seeds. With fewer than ``LEAST_SEEDS``, the result is a `point`.
+    true value in 95 to 98 % of cases with 5, 10 or 20 seeds. With fewer than ``LEAST_SEEDS``, both ends are NaN.
 
     Raises:
         ValueError: a side has fewer than 2 seeds, or an error is not finite.
@@ -293,17 +292,17 @@ def improvement_interval(ours: Array, theirs: Array, *, level: float = LEVEL) ->
     for sample in (ours, theirs):
         if len(sample) < 2 or not np.isfinite(sample).all():
             raise ValueError(f"an interval needs 2 or more seeds with finite errors, got {np.asarray(sample).tolist()}")
-    n, m, found = len(ours), len(theirs), float(improvement(ours, theirs))
+    n, m, share = len(ours), len(theirs), float(improvement(ours, theirs))
     if min(n, m) < LEAST_SEEDS:
-        return point(found)
+        return Interval(share)
     z = float(stats.norm.isf((1 - level) / 2))
 
     def excess(p: float) -> float:
         """Squared distance from p to the statistic, minus z^2 times the variance under p; above 0, p is rejected."""
         variance = p * (1 - p) * (1 + ((n + m) / 2 - 1) * ((1 - p) / (2 - p) + p / (1 + p))) / (n * m)
-        return (found - p) ** 2 - z * z * variance
+        return (share - p) ** 2 - z * z * variance
 
-    inside = float(np.clip(found, 1e-9, 1 - 1e-9))
-    low = optimize.brentq(excess, 0.0, inside) if found > 0 else 0.0
-    high = optimize.brentq(excess, inside, 1.0) if found < 1 else 1.0
-    return Interval(found, low, high)
+    inside = float(np.clip(share, 1e-9, 1 - 1e-9))
+    low = optimize.brentq(excess, 0.0, inside) if share > 0 else 0.0
+    high = optimize.brentq(excess, inside, 1.0) if share < 1 else 1.0
+    return Interval(share, low, high)

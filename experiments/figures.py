@@ -39,39 +39,39 @@ with loading():  # Ctrl-C shows no traceback
     from sgimd_torch.figures.learning import COLOURS, NAMES
     from sgimd_torch.figures.save import save_figure
     from sgimd_torch.files import make_folder
-    from sgimd_torch.views.statistics import Interval, iqm_interval, rng
+    from sgimd_torch.views.statistics import Interval, bootstrap_rng, iqm_interval
 
 KIND: Final = "svg"
 ERROR: Final = "mean distance to the goals (m)"
 LEARNERS: Final = ("random", "sagg-riac", "observation", "imitation", "sgim-d")  # learners of the paper
 
 
-def learning(found: Evidence) -> Figure:
+def learning(evidence: Evidence) -> Figure:
     """Error against movements on the rod."""
     figure = Figure(figsize=(8, 4.4), layout="constrained")
     ax = figure.subplots()
-    shown = ("random", "sagg-riac", "sgim-d", "practice", "practice-middle", "practice-taught")
-    curves(ax, found, {name: name for name in shown})
+    names = ("random", "sagg-riac", "sgim-d", "practice", "practice-middle", "practice-taught")
+    curves(ax, evidence, {name: name for name in names})
     return figure
 
 
-def paper(found: Evidence) -> Figure:
+def paper(evidence: Evidence) -> Figure:
     """Error against movements of the paper's five learners, and of three of them in the larger space."""
     figure = Figure(figsize=(10, 4.2), layout="constrained")
     small, large = figure.subplots(1, 2, sharey=True)
-    curves(small, found, {name: name for name in LEARNERS})
-    curves(large, found, {"random": "random", "sagg-riac": "sagg-riac-large", "sgim-d": "sgim-d-large"})
+    curves(small, evidence, {name: name for name in LEARNERS})
+    curves(large, evidence, {"random": "random", "sagg-riac": "sagg-riac-large", "sgim-d": "sgim-d-large"})
     small.set_title("the paper's task space")
     large.set(title="10⁴ times larger", ylabel="")
     return figure
 
 
-def gain(found: Evidence) -> Figure:
+def gain(evidence: Evidence) -> Figure:
     """The error after 1000 movements on the rod, at each step of GAIN."""
-    return _rows({step: partial(found.error, name, 1000) for step, name in GAIN.items()}, ERROR)
+    return _rows({step: partial(evidence.error, name, 1000) for step, name in GAIN.items()}, ERROR)
 
 
-def curiosity(found: Evidence) -> Figure:
+def curiosity(evidence: Evidence) -> Figure:
     """The error with goals by interest divided by the error with uniform goals."""
     pairs = {
         "SGIM-D, T 10⁴ times larger, 5000": ("sgim-d-large", "sgim-d-uniform-large", LAST),
@@ -79,7 +79,7 @@ def curiosity(found: Evidence) -> Figure:
         "SGIM-D, 5000": ("sgim-d", "sgim-d-uniform", LAST),
         "practice, 5000": ("practice-interest", "practice", LAST),  # nearly all of T is within reach
     }
-    numbers = {label: partial(found.ratio, *pair) for label, pair in pairs.items()}
+    numbers = {label: partial(evidence.ratio, *pair) for label, pair in pairs.items()}
     figure = _rows(numbers, "error with interest / with uniform goals", form=".2f")
     (ax,) = figure.axes
     ax.axvline(1, color="black", linewidth=1, zorder=0)
@@ -95,16 +95,16 @@ FIGURES: Final[dict[str, Callable[[Evidence], Figure]]] = {
 }
 
 
-def curves(ax: Axes, found: Evidence, shown: Mapping[str, str]) -> None:
-    """Draw errors against movements, with intervals as bands; ``shown`` has a variant for each algorithm.
+def curves(ax: Axes, evidence: Evidence, variants: Mapping[str, str]) -> None:
+    """Draw errors against movements, with intervals as bands; ``variants`` has a variant for each algorithm.
 
     The axis of movements is logarithmic, because learners differ most in the first movements.
     """
     ends: dict[str, float] = {}
-    for algorithm, name in shown.items():
-        curve = found.curve(name)
+    for algorithm, name in variants.items():
+        curve = evidence.curve(name)
         movements = curve.columns
-        centre, low, high = np.array([iqm_interval(curve[at], rng=rng()) for at in movements]).T
+        centre, low, high = np.array([iqm_interval(curve[at], rng=bootstrap_rng()) for at in movements]).T
         ax.fill_between(movements, low, high, color=COLOURS[algorithm], alpha=0.2, linewidth=0)
         ax.plot(movements, centre, "o-", color=COLOURS[algorithm], markersize=4, label=NAMES[algorithm])
         ends[algorithm] = centre[-1]
@@ -115,31 +115,36 @@ def curves(ax: Axes, found: Evidence, shown: Mapping[str, str]) -> None:
     ax.set_xticks([], minor=True)
     ax.grid(alpha=0.3)
     height, gap = -np.inf, 0.06 * ax.get_ylim()[1]
-    for algorithm, end in sorted(ends.items(), key=lambda each: each[1]):
+    for algorithm, end in sorted(ends.items(), key=lambda item: item[1]):
         height = max(end, height + gap)  # so that names do not overlap
         ax.text(1.1 * LAST, height, NAMES[algorithm], color=COLOURS[algorithm], va="center")
 
 
 def _rows(numbers: Mapping[str, Callable[[], Interval]], label: str, form: str = ".3f") -> Figure:
     """A figure with a row, a point with its interval, for each of the ``numbers`` that has runs."""
-    shown: dict[str, Interval] = {}
+    intervals: dict[str, Interval] = {}
     for name, number in numbers.items():
         try:
-            shown[name] = number()
+            intervals[name] = number()
         except NotRun as missing:
             say(f"left out; not run: {missing}")
-    if not shown:
+    if not intervals:
         raise NotRun("any row of this figure")
-    figure = Figure(figsize=(9, 1 + 0.34 * len(shown)), layout="constrained")
+    figure = Figure(figsize=(9, 1 + 0.34 * len(intervals)), layout="constrained")
     ax = figure.subplots()
-    for height, found in enumerate(shown.values()):
-        ax.plot([found.low, found.high], [height, height], color="black")
-        ax.plot(found.value, height, "o", color="black", markersize=6)
+    for height, measured in enumerate(intervals.values()):
+        ax.plot([measured.low, measured.high], [height, height], color="black")
+        ax.plot(measured.value, height, "o", color="black", markersize=6)
         ax.annotate(
-            f"{found.value:{form}}", (found.value, height), (0, 6), textcoords="offset points", ha="center", size=9
+            f"{measured.value:{form}}",
+            (measured.value, height),
+            (0, 6),
+            textcoords="offset points",
+            ha="center",
+            size=9,
         )
-    ax.set_yticks(range(len(shown)), [name.replace("`", "") for name in shown])
-    ax.set(xlabel=label, ylim=(len(shown) - 0.4, -0.8))
+    ax.set_yticks(range(len(intervals)), [name.replace("`", "") for name in intervals])
+    ax.set(xlabel=label, ylim=(len(intervals) - 0.4, -0.8))
     ax.grid(axis="x", alpha=0.3)
     return figure
 
@@ -153,11 +158,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--only", choices=FIGURES, help="figure to draw (default: all)")
     options = parser.parse_args(argv)
-    found = Evidence.of(options.results)
+    evidence = Evidence.of(options.results)
     make_folder(options.out)
     for name in FIGURES if options.only is None else [options.only]:
         try:
-            print(*save_figure(partial(FIGURES[name], found), options.out / name, KIND))
+            print(*save_figure(partial(FIGURES[name], evidence), options.out / name, KIND))
         except NotRun as missing:
             say(f"{name} is left out; not run: {missing}")
     return 0

@@ -13,7 +13,7 @@ from functools import cache, partial
 from typing import Final, NamedTuple
 
 from evidence import Level, NotRun, Statistic
-from sgimd_torch.views.statistics import LEVEL, show
+from sgimd_torch.views.statistics import LEVEL, interval_text
 
 HOLDS: Final = "holds"
 FAILS: Final = "fails"
@@ -129,7 +129,7 @@ def at_least(
 @cache
 def _above(part: Part, level: Level) -> tuple[float, float, float]:
     """Number, low and high end of a part, as distances from its bar; a distance above 0 is on the wrong side."""
-    value, low, high = (each - part.bar for each in part.measured(level=level))
+    value, low, high = (end - part.bar for end in part.measured(level=level))
     return (-value, -high, -low) if part.least else (value, low, high)
 
 
@@ -143,7 +143,7 @@ def _verdict(claim: Claim, level: float) -> str:
 
 def _number(claim: Claim) -> str:
     part = max(claim.parts, key=lambda part: part.above / max(abs(part.bar), 1e-3))
-    return show(part.measured(), part.form).replace("-", "−") + (f" ({part.name})" if part.name else "")
+    return interval_text(part.measured(), part.form).replace("-", "−") + (f" ({part.name})" if part.name else "")
 
 
 def _was_run(claim: Claim) -> bool:

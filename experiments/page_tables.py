@@ -1,6 +1,6 @@
 """The tables of the pages of results, in Markdown, and the numbers quoted in the text of these pages.
 
-page = Page(found, Path("results")); page.suite(); page.error("sgim-d")
+page = Page(evidence, Path("results")); page.suite(); page.error("sgim-d")
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Final
 from claimed import SUITE, on, paper
 from evidence import LAST, Evidence, NotRun, Statistic
 from judging import MISSING, Claim, Verdict, judge
-from sgimd_torch.views.statistics import show
+from sgimd_torch.views.statistics import interval_text
 from suite import TASKS, UNIFORM, titled
 from table import read_table
 from variants import ARMS, EXPERIMENTS, VARIANTS
@@ -62,20 +62,20 @@ class Page:
     """The tables and numbers of one page. Numbers are those after ``at`` movements; a number without runs is a dash.
 
     Args:
-        found: evidence of the experiments.
+        evidence: evidence of the experiments.
         folder: folder of the tables of results.
         missing: names of claims and numbers without runs; the page adds to this list while it is made.
         verdicts: verdicts on the claims that have runs; the page adds to this list, too.
     """
 
-    found: Evidence
+    evidence: Evidence
     folder: Path
     missing: list[str] = field(default_factory=list)
     verdicts: list[Verdict] = field(default_factory=list)
 
     def error(self, name: str, at: int = LAST, form: str = ".3f", *, between: bool = False) -> str:
         """The error (m), with its interval if ``between``."""
-        return self.cell(self.found.error, name, at, form=form, between=between)
+        return self.cell(self.evidence.error, name, at, form=form, between=between)
 
     def errors(self, name: str, times: Sequence[int], form: str = ".3f") -> list[str]:
         """The errors after each number of movements."""
@@ -83,45 +83,45 @@ class Page:
 
     def less(self, ours: str, theirs: str, at: int = LAST, form: str = ".3f") -> str:
         """Their error minus ours (m), with the interval of this difference."""
-        return self.cell(self.found.difference, theirs, ours, at, form=form, between=True)
+        return self.cell(self.evidence.difference, theirs, ours, at, form=form, between=True)
 
     def seeds(self, name: str) -> str:
         """The seeds whose runs have ended: ``240 to 259``."""
         try:
-            found = self.found.at(name, max(VARIANTS[name]["evaluate_at"])).index
+            seeds = self.evidence.at(name, max(VARIANTS[name]["evaluate_at"])).index
         except NotRun:
             return MISSING_CELL
-        return f"{found.min()} to {found.max()}"
+        return f"{seeds.min()} to {seeds.max()}"
 
     def ratio(self, ours: str, theirs: str, at: int = LAST) -> str:
         """Our error divided by theirs, with the interval of this ratio."""
-        return self.cell(self.found.ratio, ours, theirs, at, form=".2f", between=True)
+        return self.cell(self.evidence.ratio, ours, theirs, at, form=".2f", between=True)
 
     def near(self, name: str) -> str:
         """The share of chosen goals that can be reached, over the goals of all seeds: ``43.4 %``."""
-        return self.cell(self.found.near_share, name, form=".1%")
+        return self.cell(self.evidence.near_share, name, form=".1%")
 
     def cell(self, statistic: Statistic, *of: object, form: str = ".3f", between: bool = False) -> str:
         """A number, with its interval if ``between``."""
         try:
-            found = statistic(*of) if between else statistic(*of, level=None)
+            number = statistic(*of) if between else statistic(*of, level=None)
         except NotRun as missing:
             self.missing.append(str(missing))
             return MISSING_CELL
-        return show(found, form).replace("-", "−").replace("%", " %")
+        return interval_text(number, form).replace("-", "−").replace("%", " %")
 
     def claims(self, claims: Callable[[Evidence], Sequence[Claim]]) -> str:
         """A table with a row for each claim that has runs."""
-        verdicts = [each for each in self.judged(claims(self.found)) if each.verdict != MISSING]
-        rows = [(each.claim, each.number, f"**{each.verdict}**") for each in verdicts]
+        verdicts = [verdict for verdict in self.judged(claims(self.evidence)) if verdict.verdict != MISSING]
+        rows = [(verdict.claim, verdict.number, f"**{verdict.verdict}**") for verdict in verdicts]
         return markdown(("claim", "number [95 %]", "verdict"), rows)
 
     def paper(self) -> str:
         """A row for each claim of the paper, with two verdicts: on learners by the letter of the paper, and on ours."""
-        letter, ours = paper(self.found, letter=True), paper(self.found, letter=False)
+        letter, ours = paper(self.evidence, letter=True), paper(self.evidence, letter=False)
         verdicts = self.judged([*letter, *ours])
         cells = [
-            (our.text, *(f"**{each.verdict}** {each.number}".strip() for each in (theirs, mine)), our.note)
+            (our.text, *(f"**{verdict.verdict}** {verdict.number}".strip() for verdict in (theirs, mine)), our.note)
             for our, theirs, mine in zip(ours, verdicts, verdicts[len(ours) :], strict=False)
         ]
         return markdown(("claim", "to the letter, by eq. (9)", "our SGIM-D, by `process`", "in a sentence"), cells)
@@ -129,8 +129,8 @@ class Page:
     def judged(self, claims: Sequence[Claim]) -> list[Verdict]:
         """A verdict on each claim."""
         verdicts = judge(claims)
-        self.missing += [each.claim for each in verdicts if each.verdict == MISSING]
-        self.verdicts += [each for each in verdicts if each.verdict != MISSING]
+        self.missing += [verdict.claim for verdict in verdicts if verdict.verdict == MISSING]
+        self.verdicts += [verdict for verdict in verdicts if verdict.verdict != MISSING]
         return verdicts
 
     def rivals(self) -> str:
@@ -169,7 +169,7 @@ class Page:
         both = [[f"{name}{end}" for name in ("sgim-d-letter", *small, "sgim-d")] for end in ("", "-large")]
         for name, large in zip(*both, strict=True):
             own = " by paper" if name.endswith("letter") else " by linear" if name.startswith("ladder") else ""
-            rows.append([f"`{name}`", *(self.error(each) for each in (f"{name}{own}", name, large))])
+            rows.append([f"`{name}`", *(self.error(variant) for variant in (f"{name}{own}", name, large))])
         return markdown(("step", "T, by its own answer", "T, by `process`", "large T, by `process`"), rows)
 
     def models(self) -> str:
@@ -177,7 +177,7 @@ class Page:
         rows = []
         for name, by in (("sgim-d", ""), ("sgim-d-model", " by model"), ("sgim-d-model-alone", " by model-alone")):
             arms = [f"{name}.{arm}{by}" for arm in ARMS]
-            cells = [self.error(each, 2000, ".4f") if f"{name}.{ARMS[0]}" in VARIANTS else "–" for each in arms]
+            cells = [self.error(variant, 2000, ".4f") if f"{name}.{ARMS[0]}" in VARIANTS else "–" for variant in arms]
             rows.append(
                 [f"`{name}`", *self.errors(f"{name}{by}", (1000, LAST), ".4f"), *cells, self.error(name, form=".4f")]
             )
@@ -191,10 +191,10 @@ class Page:
         for name in sorted(
             ["practice", "practice-taught", "sgim-d", *names], key=lambda name: self.error(name, LAST, ".9f")
         ):
-            shown = "0" if name == "practice" else "all"
+            demonstrations = "0" if name == "practice" else "all"
             if name.startswith(("sgim-im", "sgim-acts")):
-                shown = self.cell(self.found.count, "asked", name, "shown", form=".0f")
-            rows.append([f"`{name}`", *self.errors(name, (1000, LAST)), shown])
+                demonstrations = self.cell(self.evidence.count, "asked", name, "shown", form=".0f")
+            rows.append([f"`{name}`", *self.errors(name, (1000, LAST)), demonstrations])
         return markdown(("learner", "1000", "5000", "shown"), rows)
 
     def tuned(self) -> str:
@@ -205,7 +205,7 @@ class Page:
         table = read_table(self.folder, "rivals.csv")
         first, later = (
             half.groupby(["rival", "setting"])[["linear", "process"]].mean()
-            for half in (table[(table.movements == LAST) & here] for here in (table.seed < 1002, table.seed >= 1002))
+            for half in (table[(table.movements == LAST) & rows] for rows in (table.seed < 1002, table.seed >= 1002))
         )
         best = first.mean(axis=1).groupby("rival").idxmin()
         places = [place for rival in table.rival.unique() for place in dict.fromkeys([(rival, "default"), best[rival]])]
@@ -217,5 +217,5 @@ class Page:
         return markdown(("rival", "setting", "first seeds", "later seeds"), rows)
 
     def _over_tasks(self, name: str, tasks: Sequence[str], at: int) -> str:
-        names = [[on(each, task) for task in tasks] for each in (name, "random")]
-        return self.cell(self.found.over_tasks, *names, at, form=".2f")
+        names = [[on(learner, task) for task in tasks] for learner in (name, "random")]
+        return self.cell(self.evidence.over_tasks, *names, at, form=".2f")

@@ -45,7 +45,8 @@ NOISES: Final = ("none", "even", "speed", "gross")
 COUNTS: Final = (50, 100, 250, 500, 1000)  # movements at which a learner is evaluated
 UNSEEN: Final = range(320, 380)  # robots of the page ANY_ROBOT, named before the first of them was run
 TABLE: Final = "random.csv"
-RANDOM, BASELINE = "random", "uniform-nearest"  # the references
+RANDOM: Final = "random"  # reference: random movements
+BASELINE: Final = "uniform-nearest"  # reference: the standard baseline
 NARROW: Final = {**PRACTICE, "explore": partial(Returning, first=0)}
 LEARNERS: Final[Mapping[str, Callable[[RandomRobot, int], Learner]]] = {
     "practice": practice,
@@ -106,22 +107,22 @@ class RandomRobot:
         x = 2 * np.asarray(theta, dtype=np.float64) - 1
         if self.family == "chain":
             angles = np.cumsum(x * self._limits)
-            found = np.array([self._lengths @ np.cos(angles), self._lengths @ np.sin(angles)])
+            outcome = np.array([self._lengths @ np.cos(angles), self._lengths @ np.sin(angles)])
         elif self.family in ("spatial", "pose"):
-            found = self._pose(x)[: self._outcome_dim]
+            outcome = self._pose(x)[: self._outcome_dim]
         else:
             turns = np.pi * (x + 1)
             inputs = np.concatenate((np.cos(turns), np.sin(turns))) if self.family == "phases" else x
             hidden = np.sin(np.concatenate((inputs, np.asarray(context))) @ self._first + self._phase)
             if self.family == "rugged":
                 hidden = np.tanh(hidden @ self._second)
-            found = (hidden @ self._last)[: self._outcome_dim]
+            outcome = (hidden @ self._last)[: self._outcome_dim]
             push = float(x @ self._gate / np.linalg.norm(self._gate))
             if self.family == "throw":
-                found = found * (1 + abs(push)) ** 2
+                outcome = outcome * (1 + abs(push)) ** 2
             if self.family == "idle":
-                found = found * max(0.0, math.tanh(3 * push))
-        scaled: Array = found * self._unit
+                outcome = outcome * max(0.0, math.tanh(3 * push))
+        scaled: Array = outcome * self._unit
         return scaled
 
     def _pose(self, x: Array) -> Array:
@@ -140,12 +141,12 @@ class RandomRobot:
 
     def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
         """Outcome of a movement, with noise."""
-        found, sd = self.effect(context, theta), self.outcome_noise
+        outcome, sd = self.effect(context, theta), self.outcome_noise
         if self.noise == "speed":
             sd *= 2 * float(np.abs(2 * np.asarray(theta) - 1).mean())
         if self.noise == "gross" and rng.random() < 0.03:
             sd *= 20
-        return found + (rng.normal(0, sd, self._outcome_dim) if sd else 0.0)
+        return outcome + (rng.normal(0, sd, self._outcome_dim) if sd else 0.0)
 
     def error(self, inverse: Inverse) -> float:
         """Mean distance between goals and the effects of the answers, relative to the spread of the goals."""
@@ -159,12 +160,12 @@ def life(number: int, name: str) -> dict[int, tuple[float, int]]:
     robot = RandomRobot(number)
     learner = LEARNERS[name](robot, number)
     references = [LocalProcess(learner.problem), NearestNeighbour(learner.problem)]
-    found = {}
+    errors = {}
     for episode in run(learner, robot, number, movements=COUNTS[-1]):
         if (movements := episode.index + 1) in COUNTS:
             answers: list[Inverse] = references if name in (RANDOM, BASELINE) else [learner.inverse]
-            found[movements] = min(map(robot.error, answers)), len(learner.changes)
-    return found
+            errors[movements] = min(map(robot.error, answers)), len(learner.changes)
+    return errors
 
 
 def make(

@@ -20,19 +20,19 @@ from random_robots import COUNTS, FAMILIES, LEARNERS, NOISES, RANDOM, kind
 from robots import COMPARED, after_change, best, errors, harmful, over_anew, share
 from sgimd_torch.figures.names import COLOURS, NAMES
 from sgimd_torch.spaces import Array
-from sgimd_torch.views.statistics import Interval, iqm_interval, rng
+from sgimd_torch.views.statistics import Interval, bootstrap_rng, iqm_interval
 
 FACTORS: Final = np.geomspace(1, 8, 43)  # of a performance profile
 KINDS_AT: Final = 250
 BEGINNINGS: Final = {ANEW: "nothing", GOES_ON: "the simulator", WRONG: "a mirrored simulator"}
 
 
-def shares(found: Evidence) -> Figure:
+def shares(evidence: Evidence) -> Figure:
     """Share of random robots on which each learner is best, and on which it is harmful, against movements."""
     figure, panels = _panels("learner is best", "worse than random movements")
     for ax, statistic, learners in zip(panels, (best, harmful), (LEARNERS, COMPARED), strict=True):
         for name in learners:
-            by_count = [statistic(found, name, at) for at in COUNTS]
+            by_count = [statistic(evidence, name, at) for at in COUNTS]
             _drawn(ax, COUNTS, by_count, COLOURS[name], NAMES[name], "o-")
         ax.set(xscale="log", xlabel="movements executed", ylim=(0, 1))
         _ticks(ax, COUNTS)
@@ -40,11 +40,11 @@ def shares(found: Evidence) -> Figure:
     return figure
 
 
-def profile(found: Evidence) -> Figure:
+def profile(evidence: Evidence) -> Figure:
     """Performance profiles: share of random robots on which an error is within a factor of the smallest one."""
     figure, panels = _panels("after 250 movements", "after 1000 movements")
     for ax, at in zip(panels, (250, 1000), strict=True):
-        table = errors(found, at)
+        table = errors(evidence, at)
         ratios = table.div(table.min(axis=1), axis=0)
         for name in LEARNERS:
             within = [share(ratios[name] <= factor) for factor in FACTORS]
@@ -55,9 +55,9 @@ def profile(found: Evidence) -> Figure:
     return figure
 
 
-def kinds(found: Evidence) -> Figure:
+def kinds(evidence: Evidence) -> Figure:
     """Errors over those of random movements, by family and by noise of the random robots."""
-    table = errors(found, KINDS_AT)
+    table = errors(evidence, KINDS_AT)
     ratios = np.log(table.div(table[RANDOM], axis=0))
     of = [kind(int(number))[:2] for number in table.index]
     rows = {**{f"{name} noise" if name != "none" else "no noise": (1, name) for name in NOISES[::-1]},
@@ -65,7 +65,7 @@ def kinds(found: Evidence) -> Figure:
     figure = Figure(figsize=(7.5, 5.6), layout="constrained")
     ax = figure.subplots()
     for name in COMPARED:
-        means = [np.exp(ratios[name][[each[place] == word for each in of]].mean()) for place, word in rows.values()]
+        means = [np.exp(ratios[name][[names[place] == word for names in of]].mean()) for place, word in rows.values()]
         ax.plot(means, range(len(rows)), "o", color=COLOURS[name], markersize=8, label=NAMES[name])
     ax.axvline(1, color="black", linewidth=1, zorder=0)
     ax.axhline(len(NOISES) - 0.5, color="0.7", linewidth=1, zorder=0)
@@ -77,13 +77,15 @@ def kinds(found: Evidence) -> Figure:
     return figure
 
 
-def changes(found: Evidence) -> Figure:
+def changes(evidence: Evidence) -> Figure:
     """Errors after a change over those of a learner that starts anew: a panel for each robot, numbers in cells."""
     figure = Figure(figsize=(7.5, 7), layout="constrained")
     panels = figure.subplots(2, 2, sharey=True)
     for ax, robot in zip(panels.flat, ROBOTS, strict=True):
         times = after(robot)
-        cells = np.array([[over_anew(found, robot, each, at, level=None).value for at in times] for each in CHANGES])
+        cells = np.array(
+            [[over_anew(evidence, robot, change, at, level=None).value for at in times] for change in CHANGES]
+        )
         ax.pcolormesh(cells, cmap="RdBu_r", norm=LogNorm(0.1, 10), edgecolors="white", linewidth=2)
         for (row, column), ratio in np.ndenumerate(cells):
             colour = "black" if 0.25 < ratio < 4 else "white"
@@ -97,13 +99,13 @@ def changes(found: Evidence) -> Figure:
     return figure
 
 
-def simulator(found: Evidence) -> Figure:
+def simulator(evidence: Evidence) -> Figure:
     """Error on the arm as it was built, of learners that begin with what a simulator showed or with nothing."""
     figure = Figure(figsize=(7.5, 4), layout="constrained")
     ax = figure.subplots()
     for (learner, name), colour in zip(BEGINNINGS.items(), ("random", "practice", "sagg-riac"), strict=True):
-        by_seed = [after_change(found, ARM, SIMULATOR, learner, at).to_numpy() for at in BEGUN]
-        means = [iqm_interval(each, rng=rng()) for each in by_seed]
+        by_seed = [after_change(evidence, ARM, SIMULATOR, learner, at).to_numpy() for at in BEGUN]
+        means = [iqm_interval(errors, rng=bootstrap_rng()) for errors in by_seed]
         _drawn(ax, BEGUN, means, COLOURS[colour], f"begun with {name}", "o-")
     ax.set(xscale="log", yscale="log", xlabel="movements on the real arm", ylabel="mean distance to the goals (m)")
     _ticks(ax, BEGUN)
@@ -135,7 +137,7 @@ def _drawn(ax: Axes, x: ArrayLike, intervals: Sequence[Interval], colour: str, n
 
 
 def _ticks(ax: Axes, places: tuple[float, ...]) -> None:
-    ax.set_xticks(places, [f"{each:g}" for each in places])
+    ax.set_xticks(places, [f"{tick:g}" for tick in places])
     ax.set_xticks([], minor=True)
 
 

@@ -1,6 +1,6 @@
 """Robots that nobody tuned on, and robots that change: statistics and claims from random.csv and changes.csv.
 
-    harmful(found, "practice", 250); judge(any_robot(found)); judge(changes(found))
+    harmful(evidence, "practice", 250); judge(any_robot(evidence)); judge(changes(evidence))
 On random robots, the sample is the robots: each is learnt once by each learner.
 """
 
@@ -19,7 +19,7 @@ from judging import Claim, Part, at_most
 from page_tables import MISSING_CELL, Page, markdown
 from random_robots import BASELINE, COUNTS, LEARNERS, RANDOM
 from sgimd_torch.figures.names import NAMES
-from sgimd_torch.views.statistics import LEVEL, Interval, interval, point, rng
+from sgimd_torch.views.statistics import LEVEL, Interval, bootstrap_rng, interval
 
 COMPARED: Final = tuple(name for name in LEARNERS if name != RANDOM)
 HARMFUL: Final = 1.02  # times the error of random movements; a larger error counts as harm
@@ -28,13 +28,13 @@ MEANS: Final = dict(
 )  # bars of errors over those of random ones
 
 
-def errors(found: Evidence, at: int) -> pd.DataFrame:
+def errors(evidence: Evidence, at: int) -> pd.DataFrame:
     """Errors after ``at`` movements: a row for each robot on which every learner has learnt, a column for each learner.
 
     Raises:
         NotRun: there are fewer than two such robots.
     """
-    rows = found.random[found.random["movements"] == at]
+    rows = evidence.random[evidence.random["movements"] == at]
     table = rows.pivot(index="number", columns="learner", values="error").reindex(columns=[*LEARNERS]).dropna()
     if len(table) < 2:
         raise NotRun(f"random robots at {at}")
@@ -44,39 +44,39 @@ def errors(found: Evidence, at: int) -> pd.DataFrame:
 def share(which: pd.Series, *, level: Level = LEVEL) -> Interval:
     """The share of robots for which ``which`` is true, with Wilson's interval."""
     if level is None:
-        return point(float(which.mean()))
-    found = stats.binomtest(int(which.sum()), len(which)).proportion_ci(level, "wilson")
-    return Interval(float(which.mean()), found.low, found.high)
+        return Interval(float(which.mean()))
+    between = stats.binomtest(int(which.sum()), len(which)).proportion_ci(level, "wilson")
+    return Interval(float(which.mean()), between.low, between.high)
 
 
-def harmful(found: Evidence, name: str, at: int, *, level: Level = LEVEL) -> Interval:
+def harmful(evidence: Evidence, name: str, at: int, *, level: Level = LEVEL) -> Interval:
     """The share of robots on which a learner errs more than ``HARMFUL`` times as much as random movements."""
-    table = errors(found, at)
+    table = errors(evidence, at)
     return share(table[name] > HARMFUL * table[RANDOM], level=level)
 
 
-def best(found: Evidence, name: str, at: int, *, level: Level = LEVEL) -> Interval:
+def best(evidence: Evidence, name: str, at: int, *, level: Level = LEVEL) -> Interval:
     """The share of robots on which a learner has the smallest error."""
-    return share(errors(found, at).idxmin(axis=1) == name, level=level)
+    return share(errors(evidence, at).idxmin(axis=1) == name, level=level)
 
 
-def over(found: Evidence, ours: str, theirs: str, at: int, *, level: Level = LEVEL) -> Interval:
+def over(evidence: Evidence, ours: str, theirs: str, at: int, *, level: Level = LEVEL) -> Interval:
     """The geometric mean over robots of our error divided by theirs."""
-    table = errors(found, at)
+    table = errors(evidence, at)
     ratios = np.log(table[ours] / table[theirs]).to_numpy()
     if level is None:
-        return point(float(np.exp(ratios.mean())))
-    return interval(lambda drawn: np.exp(drawn.mean(axis=-1)), ratios, rng=rng(), level=level)
+        return Interval(float(np.exp(ratios.mean())))
+    return interval(lambda drawn: np.exp(drawn.mean(axis=-1)), ratios, rng=bootstrap_rng(), level=level)
 
 
-def any_robot(found: Evidence) -> list[Claim]:
+def any_robot(evidence: Evidence) -> list[Claim]:
     """Claims about `practice` on random robots."""
 
     def less(theirs: str) -> list[Part]:
-        return [at_most(1, over, found, "practice", theirs, at, name=f"at {at}") for at in COUNTS]
+        return [at_most(1, over, evidence, "practice", theirs, at, name=f"at {at}") for at in COUNTS]
 
-    seldom = [at_most(0.05, harmful, found, "practice", at, margin=0.1, name=f"at {at}") for at in COUNTS]
-    means = [at_most(bar, over, found, "practice", RANDOM, at, name=f"at {at}") for at, bar in MEANS.items()]
+    seldom = [at_most(0.05, harmful, evidence, "practice", at, margin=0.1, name=f"at {at}") for at in COUNTS]
+    means = [at_most(bar, over, evidence, "practice", RANDOM, at, name=f"at {at}") for at, bar in MEANS.items()]
     listed = ", ".join(f"{bar:.2f}" for bar in MEANS.values())
     return [
         Claim(
@@ -95,8 +95,8 @@ def table(page: Page) -> str:
     rows = []
     try:
         for name in COMPARED:
-            ratios = [each[name] / each[RANDOM] for each in (errors(page.found, at) for at in COUNTS)]
-            rows.append([NAMES[name], *(f"{np.exp(np.log(each).mean()):.2f}, {each.max():.1f}" for each in ratios)])
+            ratios = [table[name] / table[RANDOM] for table in (errors(page.evidence, at) for at in COUNTS)]
+            rows.append([NAMES[name], *(f"{np.exp(np.log(ratio).mean()):.2f}, {ratio.max():.1f}" for ratio in ratios)])
     except NotRun as missing:
         page.missing.append(str(missing))
     return markdown(("mean, worst", *map(str, COUNTS)), rows)
@@ -104,31 +104,31 @@ def table(page: Page) -> str:
 
 def alarms(page: Page) -> str:
     """How many lives on random robots, which do not change, noticed a change: ``2 of 240``."""
-    rows = page.found.random
+    rows = page.evidence.random
     last = rows[(rows["movements"] == COUNTS[-1]) & (~rows["learner"].isin((BASELINE, RANDOM)))]
     return f"{(last['noticed'] > 0).sum()} of {len(last)}"
 
 
-def after_change(found: Evidence, robot: str, change: str, learner: str, at: int) -> pd.Series:
+def after_change(evidence: Evidence, robot: str, change: str, learner: str, at: int) -> pd.Series:
     """Errors by seed, ``at`` movements after a change.
 
     Raises:
         NotRun: fewer than two seeds were run.
     """
     place = (robot, change, learner, at)
-    if place not in found.changes.index or len(errors := found.changes.loc[place, "error"]) < 2:
+    if place not in evidence.changes.index or len(errors := evidence.changes.loc[place, "error"]) < 2:
         raise NotRun(f"{learner} after {change} of {robot} at {at}")
     return errors
 
 
-def seeds(found: Evidence) -> str:
+def seeds(evidence: Evidence) -> str:
     """The seeds of the lives on robots that change: ``240 to 245``."""
-    made = found.changes.index.get_level_values("seed")
+    made = evidence.changes.index.get_level_values("seed")
     return f"{made.min()} to {made.max()}" if len(made) else MISSING_CELL
 
 
 def over_anew(
-    found: Evidence,
+    evidence: Evidence,
     robot: str,
     change: str,
     at: int,
@@ -138,21 +138,21 @@ def over_anew(
     level: Level = LEVEL,
 ) -> Interval:
     """The error after a change divided by that of a learner that starts anew, or of an ``other`` one."""
-    return found.over(*(after_change(found, robot, change, each, at) for each in (learner, other)), level=level)
+    return evidence.over(*(after_change(evidence, robot, change, name, at) for name in (learner, other)), level=level)
 
 
-def changes(found: Evidence) -> list[Claim]:
+def changes(evidence: Evidence) -> list[Claim]:
     """Claims about `practice` on robots that change, and about beginning with a simulator."""
 
     def parts(bar: float, *names: str, times: tuple[int, ...] = AFTER, other: str = ANEW) -> list[Part]:
         return [
-            at_most(bar, over_anew, found, robot, change, at, GOES_ON, other, name=f"{change}, {robot}, {at}")
+            at_most(bar, over_anew, evidence, robot, change, at, GOES_ON, other, name=f"{change}, {robot}, {at}")
             for robot, change in product(ROBOTS, names)
             for at in {*times} & {*after(robot)}
         ]
 
     def begun(bar: float, learner: str, *times: int) -> list[Part]:
-        return [at_most(bar, over_anew, found, ARM, SIMULATOR, at, learner, name=f"at {at}") for at in times]
+        return [at_most(bar, over_anew, evidence, ARM, SIMULATOR, at, learner, name=f"at {at}") for at in times]
 
     shifts = ("offset-0.1", "offset-0.02", "gain")
     return [

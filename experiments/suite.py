@@ -62,7 +62,8 @@ TASKS: Final[dict[str, SuiteTask]] = {
     "puck": SuiteTask({"environment": "experiments.toys:puck"}),
     "fetch": SuiteTask({"environment": "experiments.toys:fetch"}, new=True),
 }
-RANDOM, UNIFORM = "random-nearest", "uniform-nearest"
+RANDOM: Final = "random-nearest"  # reference: random movements
+UNIFORM: Final = "uniform-nearest"  # reference: uniform goals
 REFERENCES: Final[dict[str, dict[str, Any]]] = {
     RANDOM: {"algorithm": "random", "inverse": "nearest"},
     UNIFORM: {
@@ -81,8 +82,8 @@ SHARED: Final = ("movements", "evaluate_at", "evaluated_by", "repeats", "floor_a
 def main(argv: Sequence[str] | None = None) -> int:
     """Carry out unfinished runs, print a table for each task, and return the exit code: 1 if runs failed, else 0."""
     options, rest = parsed_options(argv)
-    configs, flags = runs_of(options, rest)
-    code = run_all(configs, options, flags, configs[0].out.parent)
+    configs = runs_of(options, rest)
+    code = run_all(configs, options, configs[0].out.parent)
     from sgimd_torch.views import table  # scipy's statistics are slow to import
 
     for folder in [] if options.dry_run else dict.fromkeys(config.out for config in configs if finished(config)):
@@ -91,8 +92,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     return code
 
 
-def runs_of(options: argparse.Namespace, rest: Sequence[str]) -> tuple[list[Config], list[str]]:
-    """Settings of all runs, seed by seed and then task by task, and the flags of ``sgimd run``.
+def runs_of(options: argparse.Namespace, rest: Sequence[str]) -> list[Config]:
+    """Settings of all runs, seed by seed and then task by task.
 
     Args:
         options: parsed options, of which ``tasks``, ``seeds`` and ``vary`` are used.
@@ -106,7 +107,7 @@ def runs_of(options: argparse.Namespace, rest: Sequence[str]) -> tuple[list[Conf
         if name in {word.partition(".")[0] for word in given}:
             raise ValueError(f"--{name} cannot be given here: each task has its own; choose tasks with --tasks")
     words = [*(f"--{name}={value}" for name, value in DEFAULTS.items() if name not in given), *rest]
-    learners, flags = variants_of(options.vary, words)
+    learners = variants_of(options.vary, words)
     shared = {name: learners[0][name] for name in SHARED}
     references = [Config.from_settings({"name": name, **line, **shared}) for name, line in REFERENCES.items()]
     configs = [
@@ -121,7 +122,7 @@ def runs_of(options: argparse.Namespace, rest: Sequence[str]) -> tuple[list[Conf
         for task in options.tasks
         for config in [*references, *learners]
     ]
-    return configs, flags
+    return configs
 
 
 def titled(task: str) -> str:

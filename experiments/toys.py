@@ -68,12 +68,7 @@ class Toy:
         return self.contexts.sample(rng)
 
     def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
-        """``(outcome_dim,)``, the outcome of one movement.
-
-        Raises:
-            ValueError: ``context`` is not one point of C, or ``theta`` is not one point of Pi.
-            TypeError: ``rng`` is not a Generator.
-        """
+        """``(outcome_dim,)``, the outcome of one movement; see `Environment`."""
         context, theta = check_movement(self, context, theta)
         check_rng(rng)
         return rng.normal(self.effect(context, theta), self.outcome_noise)

@@ -52,7 +52,9 @@ INVERSE: Final[Variant] = {"inverse": "paper"}  # the letter of the paper for le
 LARGE: Final[Variant] = {"environment.task_space": 100.0}
 BASELINE: Final[Variant] = {"goals": "uniform", "inverse": "nearest", "search": "perturb"}  # standard baseline
 SCHOOL: Final = ("map-elites", "cma-mae")  # algorithms of quality diversity; they take no context
-CORNER, MANY = MADE = (Path("corner.npz"), Path("many.npz"))  # files of demonstrations that ``make_subsets`` writes
+CORNER: Final = Path("corner.npz")  # file of demonstrations nearest to one corner
+MANY: Final = Path("many.npz")  # file of the first demonstrations
+MADE: Final = (CORNER, MANY)  # files that ``make_subsets`` writes
 ONCE: Final[Variant] = {"teacher": "initial", "teacher.every": 1}  # at the start, one demonstration a movement
 PRACTICE: Final[Variant] = {"algorithm": "practice"}
 WIDE: Final[Variant] = {  # the wide family of practice alone
@@ -115,10 +117,10 @@ def _on_tasks(learners: dict[str, Variant], tasks: Iterable[str]) -> dict[str, V
 
 def _ladder(ending: str, where: Variant) -> dict[str, Variant]:
     """The steps between the letter of the paper, ``sgim-d-letter``, and our defaults, ``sgim-d``."""
-    found, line = {}, {**SGIM_D, **LETTER, **where, **END}
+    ladder, line = {}, {**SGIM_D, **LETTER, **where, **END}
     for number, (step, _, becomes) in enumerate(STEPS[:-1], 1):
-        found[f"ladder-{number}-{step}{ending}"] = line = {**line, **becomes}
-    return found
+        ladder[f"ladder-{number}-{step}{ending}"] = line = {**line, **becomes}
+    return ladder
 
 
 EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
@@ -169,9 +171,9 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
             "map-elites-tuned": {"algorithm": "map-elites", "cells": 10},
             "cma-me-tuned": {"algorithm": "cma-me", "sd": 0.05},
             "cma-mae-taught-tuned": {"algorithm": "cma-mae-taught", "sd": 0.05},
-            "home-babbling": {"algorithm": "experiments.home_babbling:home_babbling"},
+            "home-babbling": {"algorithm": "experiments.rivals:home_babbling"},
             "random-middle": {**MIDDLE, "inverse": "process", "global_range": (1.0, 1.0)},
-            "map-elites-middle": {"algorithm": "experiments.parts:map_elites_middle"},
+            "map-elites-middle": {"algorithm": "experiments.rivals:map_elites_middle"},
             "middle": MIDDLE,
             "middle-process": {**MIDDLE, "inverse": "process"},
         }.items()
@@ -235,7 +237,7 @@ def make_subsets(folder: Path) -> None:
         OSError: a file cannot be written.
     """
     everything = load_demonstrations()
-    outcomes = np.array([each.outcome for each in everything])
+    outcomes = np.array([demonstration.outcome for demonstration in everything])
     corner = np.linalg.norm(outcomes - outcomes.max(axis=0), axis=1).argsort()[:20]
     make_folder(folder)
     save_demonstrations(folder / CORNER, [everything[k] for k in corner])

@@ -80,7 +80,7 @@ def live(name: str, movements: int) -> Figures:
     robot: Any = rod if joints == "rod" else PlanarArm(int(joints), noise=0.02)
     execute, empty, rng, of_robot = robot.execute, np.zeros(0), stream(0, "bench"), 0.0
 
-    def shown() -> Demonstration:
+    def demonstration() -> Demonstration:
         theta = robot.policies.sample(rng)
         return Demonstration(empty, np.arange(2.0), np.stack((theta, theta)), execute(empty, theta, rng))
 
@@ -98,23 +98,23 @@ def live(name: str, movements: int) -> Figures:
     taught = algorithm == "sgim-d"
     more: dict[str, Any] = {"correspondence": lambda times, path: path[-1]} if taught else {}
     learner = getattr(sgimd_torch, algorithm.replace("-", "_"))(robot, 0, **more)
-    teacher = PeriodicTeacher([shown() for _ in range(100)], stream(0, "teacher")) if taught else None
+    teacher = PeriodicTeacher([demonstration() for _ in range(100)], stream(0, "teacher")) if taught else None
     robot.execute = timed
-    life, each = run(learner, robot, 0, movements=10**9, teacher=teacher), list[float]()
+    life, times = run(learner, robot, 0, movements=10**9, teacher=teacher), list[float]()
     figures: Figures = {}
     for n in SIZES:
-        while len(each) < n + movements:
-            if len(each) == n:
+        while len(times) < n + movements:
+            if len(times) == n:
                 physics = seconds(cast)
             of_robot = 0.0
             spent = seconds(partial(next, life))
-            each.append(spent - of_robot)
+            times.append(spent - of_robot)
         physics = min(physics, seconds(cast)) / 20
-        learning = float(np.sort(each[n:])[: 1 + 9 * movements // 10].mean())
+        learning = float(np.sort(times[n:])[: 1 + 9 * movements // 10].mean())
         where = f"{name}, {n} exemplars"
         figures[f"{where} (ms)"] = 1000 * learning
         figures[f"{where}, over the rod's physics"] = learning / physics
-        figures[f"{where}, whole life so far"] = float(np.mean(each[LOADED:])) / physics
+        figures[f"{where}, whole life so far"] = float(np.mean(times[LOADED:])) / physics
     return figures
 
 
@@ -214,9 +214,9 @@ def main() -> int:
         work = [(part, measure) for part in options.only for measure in PARTS[part][0]]
         for part, measure in tqdm(work, leave=False, disable=None):
             movements, compared = options.movements or PARTS[part][1], libraries[: 1 if part == "at-once" else 2]
-            figures = [[measure(library, movements) for library in compared] for _ in range(options.rounds)]
-            for name in figures[0][0]:
-                show(name, [[found[name] for found in several] for several in zip(*figures, strict=True)])
+            rounds = [[measure(library, movements) for library in compared] for _ in range(options.rounds)]
+            for name in rounds[0][0]:
+                show(name, [[figures[name] for figures in several] for several in zip(*rounds, strict=True)])
     return 0
 
 

@@ -87,9 +87,9 @@ index: contexts do not count | memory/__init__.py | memory/test_memory.py
 index: of equally near exemplars the newest first | memory/scan.py | memory/test_memory.py
     squared[place - 1] > distance ==> squared[place - 1] >= distance
 index: the radius is squared once | memory/neighbours.py | memory/test_memory.py
-    <= radius * radius ==> <= radius
+    np.where(squared <= within * within, rows, -1) ==> np.where(squared <= within, rows, -1)
 index: a larger k gets the rows of the last query | memory/neighbours.py | memory/test_neighbours.py
-    asked != key or k > found.rows.shape[1] ==> asked != key
+    asked != key or rows.shape[1] < min(n, max(k, LISTED)) or ==> asked != key or
 a Gaussian process with another kernel | inverses/kernels.py | inverses/test_local_process.py
     5 / 3 * distance**2) * decay ==> 5 / 2 * distance**2) * decay
 requests: a teacher without a reply costs nothing | asking/strategy.py | asking/test_asking.py
@@ -110,7 +110,7 @@ random streams: of a name only the first letter counts | spaces.py | test_spaces
     *name.encode() ==> *name[:1].encode()
 failures: a failed movement does not count | learner/__init__.py | learner/test_failures.py
     self.movements += 1 ==> self.movements += not isinstance(outcome, Failure)
-at once: attempts are replayed out of order | learner/__init__.py | learner/test_life.py
+at once: attempts are replayed out of order | learner/__init__.py | learner/test_at_once.py
     return [] if in_order else ==> return [] if reported else
 """
 

@@ -121,14 +121,14 @@ def read_npz(path: str | os.PathLike[str], kind: str, writer: str, names: Sequen
                 known = {info.filename: info for info in stored.infolist()}
                 wanted = {name: known[f"{name}.npy"] for name in names if f"{name}.npy" in known}
                 check_density(sum(info.file_size for info in wanted.values()), path)
-                found = {name: _array(stored, info) for name, info in wanted.items()}
-            for array in found.values():
+                arrays = {name: _array(stored, info) for name, info in wanted.items()}
+            for array in arrays.values():
                 array.flags.writeable = False
         except _UNREADABLE as error:  # numpy's own message advises allow_pickle=True, which is unsafe
             raise refused("it is damaged, or holds more than numbers") from error
-    if missing := [name for name in names if name not in found]:
+    if missing := [name for name in names if name not in arrays]:
         raise refused(f"it lacks {', '.join(missing)}")
-    return [found[name] for name in names]
+    return [arrays[name] for name in names]
 
 
 def _array(stored: zipfile.ZipFile, info: zipfile.ZipInfo) -> Stored:

@@ -89,7 +89,7 @@ class Problem:
     @property
     def trained(self) -> list[Trained]:
         """Shared objects that need training."""
-        return [each for each in self._shared.values() if isinstance(each, Trained)]
+        return [part for part in self._shared.values() if isinstance(part, Trained)]
 
 
 class Part(Built):

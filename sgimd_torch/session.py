@@ -17,6 +17,7 @@ import traceback
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
+from itertools import chain
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -122,40 +123,42 @@ def run(
         )
     execute = live(environment, seed) if execute is None else execute
     before: dict[int, BeforeMovement] = {}
-    with ExitStack() as until_the_end:
+    with ExitStack() as at_the_end:
         if record is not None:
-            from sgimd_torch.record.replay import replay  # most programs have no record
+            events = record.events()
+            if (first_event := next(events, None)) is not None:
+                from sgimd_torch.record.replay import replay  # a new life has nothing to replay
 
-            before = yield from replay(learner, record.events(), teacher=teacher)
+                before = yield from replay(learner, chain([first_event], events), teacher=teacher)
             learner.listeners.append(record.add)
-            until_the_end.callback(learner.listeners.remove, record.add)
-        in_a_row: list[Failure] = []
+            at_the_end.callback(learner.listeners.remove, record.add)
+        failed_in_a_row: list[Failure] = []
         while (first := learner.movements) < movements:
             contexts: list[Array | Failure] = []
             for place in range(min(at_once, max(1, first // JOINS_EVERY), movements - first)):
                 index = first + place
-                caused = _offered(learner, teacher, index, place, before.get(place, BeforeMovement()))
+                preceding = _offered(learner, teacher, index, place, before.get(place, BeforeMovement()))
                 context = _observed(learner, environment, index, place, seed)
-                if teachers and caused.request is None and not isinstance(context, Failure):
-                    caused = _asked(learner, environment, context, place, teachers, caused)
-                before[place] = caused
+                if teachers and preceding.request is None and not isinstance(context, Failure):
+                    preceding = _asked(learner, environment, context, place, teachers, preceding)
+                before[place] = preceding
                 contexts.append(context)
             moves = learner.ask_many(contexts)
             outcomes = _executed(execute, first, contexts, moves)
             learner.tell_many(outcomes)
             for place, (context, move, outcome) in enumerate(zip(contexts, moves, outcomes, strict=True)):
                 seen = np.full(environment.contexts.dim, np.nan) if isinstance(context, Failure) else context
-                caused = before.pop(place)
+                preceding = before.pop(place)
                 if isinstance(outcome, Failure):
-                    in_a_row.append(outcome)
-                    yield Episode(first + place, seen, move, None, *caused, outcome.reason)
+                    failed_in_a_row.append(outcome)
+                    yield Episode(first + place, seen, move, None, *preceding, outcome.reason)
                 else:
                     if move is not None:
-                        in_a_row.clear()
-                    yield Episode(first + place, seen, move, outcome, *caused)
-            if len(in_a_row) >= failures:
-                last = in_a_row[-1]
-                reason = f"{len(in_a_row)} movements in a row failed, the last one: {last.reason}"
+                        failed_in_a_row.clear()
+                    yield Episode(first + place, seen, move, outcome, *preceding)
+            if len(failed_in_a_row) >= failures:
+                last = failed_in_a_row[-1]
+                reason = f"{len(failed_in_a_row)} movements in a row failed, the last one: {last.reason}"
                 raise NoOutcomeError(reason) from last.cause
 
 

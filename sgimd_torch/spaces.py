@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import reprlib
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Final, NamedTuple
@@ -169,7 +169,7 @@ class Box:
             raise ValueError(f"Box needs corners with low < high, got {low} and {high}; were they swapped?")
         given: Any = self.names
         names = tuple(given)
-        texts = all(isinstance(each, str) and each.isprintable() for each in (*names, self.unit))
+        texts = all(isinstance(text, str) and text.isprintable() for text in (*names, self.unit))
         if isinstance(given, str) or len(names) not in (0, len(low)) or not texts:
             wanted = "all texts without control characters"
             raise ValueError(f"Box needs {len(low)} names and a unit, {wanted}, got {given!r} and {self.unit!r}")
@@ -405,6 +405,3 @@ the attempt."""
 
 AskingAttempt = Generator[Move | Request | None, Any, None]
 """Attempt that may also yield a `Request`; it is then sent a `Lesson`, or None if there is no demonstration."""
-
-Search = Callable[[Estimate, Array], Generator[Array, Array, None]]
-"""Function (start, goal) -> generator of thetas, which is sent their outcomes ``(outcome_dim,)``."""

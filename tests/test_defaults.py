@@ -5,58 +5,16 @@ with them (results/, the README) has to be made anew.
 """
 
 import ast
+import json
 from collections import defaultdict
 from pathlib import Path
+
+import pytest
 
 import sgimd_torch
 from sgimd_torch.options.config import RUN, Config
 
-SGIM_D = {
-    "environment": "fishing-rod",
-    "environment.max_wind": 0.0,
-    "environment.noise": 0.032,
-    "environment.task_space": 1.0,
-    "environment.threads": 1,
-    "budget": 15,
-    "give_up": -0.5,
-    "global_range": (0.05, 0.95),
-    "tolerance": None,
-    "explore": "anywhere",
-    "goals": "interest-map",
-    "goals.cuts": 20,
-    "goals.g_max": 30,
-    "goals.max_aspect": 5.0,
-    "goals.near": 0.05,
-    "goals.progress": "gained",
-    "goals.window": 24,
-    "inverse": "process",
-    "judge": "memory",
-    "search": "nelder-mead",
-    "search.complete": False,
-    "search.fatol": 0.05,
-    "search.noise": 0.05,
-    "search.step": 0.1,
-    "search.xatol": 0.1,
-    "social": "imitate",
-    "social.epsilon": 0.05,
-    "social.repeats": 10,
-    "teacher": "periodic",
-    "teacher.choose": "least-explored",
-    "teacher.choose.tiles": 10,
-    "teacher.every": 30,
-}
-PRACTICE = {
-    "budget": 1,
-    "global_range": (0.02, 0.3),
-    "explore": "returning",
-    "explore.first": 30,
-    "goals": "within-reach",
-    "inverse": "among-effects",
-    "search": "vary",
-    "search.sd": 0.02,
-    "social.repeats": 1,
-    "teacher": "at-once",
-}
+STORED = json.loads((Path(__file__).parent / "defaults.json").read_text())
 ONCE = (
     "budget",
     "give_up",
@@ -67,13 +25,13 @@ ONCE = (
 )
 
 
-def test_the_defaults_are_those_that_results_were_made_with():
-    def values(algorithm):
-        return {name: value for name, value in Config(algorithm).values.items() if name not in RUN}
+@pytest.mark.parametrize("algorithm", STORED)
+def test_the_defaults_are_those_that_results_were_made_with(algorithm):
+    settings = Config(algorithm).settings
+    assert {name: value for name, value in settings.items() if name not in RUN} == STORED[algorithm]
 
-    assert values("sgim-d") == SGIM_D
-    left = {name: value for name, value in SGIM_D.items() if name.split(".")[0] not in ("goals", "search", "teacher")}
-    assert values("practice-taught") == {**left, **PRACTICE}
+
+def test_the_defaults_of_the_forward_model_are_those_that_results_were_made_with():
     learnt = Config(algorithm="sgim-d", parts={"inverse": "model"})
     model = {"inverse.members": 3, "inverse.noise_heads": True, "inverse.rate": 1.0, "inverse.trust": 0.25}
     assert model.items() <= learnt.values.items()

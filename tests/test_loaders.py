@@ -1,4 +1,4 @@
-"""Every loader against damaged and impossible files: refused by the name of the file, or read as they were saved."""
+"""Files: damaged and impossible ones are refused by name, others read as they were saved; a file is replaced whole."""
 
 import io
 import os
@@ -11,7 +11,7 @@ from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
 from sgimd_torch.demonstrations.columns import ColumnNames
 from sgimd_torch.demonstrations.text import read_text
 from sgimd_torch.evaluation import Benchmark, load_benchmark, save_benchmark
-from sgimd_torch.files import checksum, read_npz, write_npz
+from sgimd_torch.files import checksum, make_folder, read_npz, replacing, write_bytes, write_npz, write_text
 from sgimd_torch.spaces import Demonstration
 
 LESSON = Demonstration(np.zeros(0), np.arange(3.0), np.ones((3, 2)), np.zeros(2))
@@ -114,13 +114,40 @@ def test_a_missing_file_and_a_folder_are_called_so(tmp_path, name):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("name", LOADERS)
-def test_saving_replaces_the_old_file_and_leaves_no_other(tmp_path, name):
-    save, load = LOADERS[name]
+WRITERS = [save for save, _ in LOADERS.values()]
+WRITERS += [lambda path: write_bytes(path, b"new\n"), lambda path: write_text(path, "new\n")]
+
+
+@pytest.mark.parametrize("write", WRITERS)
+def test_a_file_is_replaced_and_nothing_else_is_left(tmp_path, write):
     (tmp_path / "saved").write_text("old")
-    save(tmp_path / "saved")
-    load(tmp_path / "saved")
-    assert [path.name for path in tmp_path.iterdir()] == ["saved"]
+    write(tmp_path / "saved")
+    assert (tmp_path / "saved").read_bytes() not in (b"old", b"")
+    assert os.listdir(tmp_path) == ["saved"]
+
+
+def test_a_file_whose_writing_fails_stays_as_it_was(tmp_path):
+    path = tmp_path / "film.mp4"
+    path.write_text("old")
+
+    def fail():
+        with replacing(path) as partial:
+            partial.write_text("half")
+            assert path.read_text() == "old"
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        fail()
+    assert path.read_text() == "old"
+    assert os.listdir(tmp_path) == ["film.mp4"]
+
+
+def test_a_folder_that_cannot_be_made_is_named(tmp_path):
+    make_folder(tmp_path / "a" / "b")
+    make_folder(tmp_path / "a" / "b")
+    (tmp_path / "file").touch()
+    with pytest.raises(OSError, match=r"file/runs/x cannot be made: .*a file in its place"):
+        make_folder(tmp_path / "file" / "runs" / "x")
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ class Docstrings(griffe.Extension):  # type: ignore[misc]
             if inner and not member.docstring:  # attributes that a constructor sets have no docstring
                 del obj.members[name]
         if obj.docstring:
-            text = re.sub(r"(?:\B:\w+:)?(?<!`)`(\w+)`(?!`)", lambda found: link(obj, found[1]), obj.docstring.value)
+            text = re.sub(r"(?:\B:\w+:)?(?<!`)`(\w+)`(?!`)", lambda match: link(obj, match[1]), obj.docstring.value)
             if obj.is_module:  # code is indented, or follows a sentence and spaces
                 text = re.sub(r"^(\S.*?\S) {3,4}(?=\S)", r"\1\n    ", text, flags=re.MULTILINE)
                 text = re.sub(r"^(\S.*)\n(?=    )", r"\1\n\n", text, flags=re.MULTILINE)

@@ -97,7 +97,7 @@ def _families(
     wide = GoalBabbling(problem, **parts)
     if problem.trained:
         inverse, parts = AmongEffects, {**parts, "search": Vary}
-    own = Problem(environment, int(stream(seed, "narrow family").integers(2**63)), inverse=inverse)
-    narrow = GoalBabbling(own, **{**parts, "explore": Widening})
-    problem.remarks += [remark for remark in own.remarks if remark not in problem.remarks]
+    narrow_problem = Problem(environment, int(stream(seed, "narrow family").integers(2**63)), inverse=inverse)
+    narrow = GoalBabbling(narrow_problem, **{**parts, "explore": Widening})
+    problem.remarks += [remark for remark in narrow_problem.remarks if remark not in problem.remarks]
     return TwoFamilies(wide, narrow)

@@ -88,7 +88,7 @@ class StrategicInterest(StrategicGoals):
     def __init__(self, problem: Problem, *, make: Callable[[Problem], InterestMap] = BY_STRATEGY) -> None:
         super().__init__(problem)
         self._map = make(problem)
-        self._tried: dict[str, _Tried] = {}
+        self._attempts: dict[str, _Attempts] = {}
 
     @property
     def regions(self) -> list[Region]:
@@ -99,18 +99,18 @@ class StrategicInterest(StrategicGoals):
         """Progress of a strategy in a region, over its last ten attempts there. If there are fewer than 4, its ten
         attempts nearest to the middle of the region count. A strategy with fewer than 4 attempts in all has progress 1,
         the greatest possible."""
-        tried = self._tried.get(strategy)
-        if tried is None or len(tried.points) < _FEWEST:
+        attempts = self._attempts.get(strategy)
+        if attempts is None or len(attempts.points) < _FEWEST:
             return _UNTRIED
-        cached = tried.cache.get(region.path)
-        if cached is not None and cached[:2] == (region, len(tried.points)):
+        cached = attempts.cache.get(region.path)
+        if cached is not None and cached[:2] == (region, len(attempts.points)):
             return cached[2]
         rows = region.strategies == strategy
         if rows.sum() >= _FEWEST:
             progress = region.interest_among(rows)
         else:
-            progress = tried.progress_near((region.low + region.high) / 2, self._map.sides)
-        tried.cache[region.path] = region, len(tried.points), progress
+            progress = attempts.progress_near((region.low + region.high) / 2, self._map.sides)
+        attempts.cache[region.path] = region, len(attempts.points), progress
         return progress
 
     def choose(self, context: ArrayLike, costs: Mapping[str, float]) -> tuple[str, Array]:
@@ -145,11 +145,11 @@ class StrategicInterest(StrategicGoals):
         """
         self._map.add(context, goal, competence, strategy, gain)
         point = np.concatenate((np.asarray(context, dtype=np.float64), np.asarray(goal, dtype=np.float64)))
-        nothing = _Tried(np.empty((0, len(point))), np.empty(0), np.empty(0), {})
-        self._tried[strategy] = self._tried.get(strategy, nothing).extend(point, competence, gain)
+        nothing = _Attempts(np.empty((0, len(point))), np.empty(0), np.empty(0), {})
+        self._attempts[strategy] = self._attempts.get(strategy, nothing).extend(point, competence, gain)
 
 
-class _Tried(NamedTuple):
+class _Attempts(NamedTuple):
     """All attempts of a strategy. For the path of each region, ``cache`` holds the region, the number of attempts and
     the progress."""
 
@@ -158,10 +158,10 @@ class _Tried(NamedTuple):
     gains: Array
     cache: dict[str, tuple[Region, int, float]]
 
-    def extend(self, point: Array, competence: float, gain: float) -> _Tried:
+    def extend(self, point: Array, competence: float, gain: float) -> _Attempts:
         """All attempts and one more."""
         competences, gains = np.append(self.competences, competence), np.append(self.gains, gain)
-        return _Tried(np.vstack((self.points, point)), competences, gains, self.cache)
+        return _Attempts(np.vstack((self.points, point)), competences, gains, self.cache)
 
     def progress_near(self, point: Array, sides: Array) -> float:
         """Progress over the ten attempts nearest to a point of C x T; distances are relative to ``sides``."""

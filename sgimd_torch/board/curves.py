@@ -1,7 +1,7 @@
 """The curves of a board: numbers by tag, computed from episodes, evaluations and regions.
 
 Section 3.2.1 of Nguyen & Oudeyer (2014) defines interest and competence of a region.
-    behaviour = Behaviour(0.02); behaviour.episode(episode); behaviour.curves(); of_regions(interest_map.regions)
+    behaviour = Behaviour(0.02); behaviour.episode(episode); behaviour.curves(); region_curves(interest_map.regions)
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class Behaviour:
         return values
 
 
-def of_evaluation(evaluation: Evaluation, near: float) -> dict[str, float]:
+def evaluation_curves(evaluation: Evaluation, near: float) -> dict[str, float]:
     """Values of the curves of an evaluation by tag; a goal with an error of at most ``near`` counts as met."""
     return {
         "error/mean": evaluation.mean_error,
@@ -79,7 +79,7 @@ def of_evaluation(evaluation: Evaluation, near: float) -> dict[str, float]:
     }
 
 
-def of_regions(regions: Sequence[Region]) -> dict[str, float]:
+def region_curves(regions: Sequence[Region]) -> dict[str, float]:
     """Mean competence and mean interest, by tag, of each node of the tree whose leaves are ``regions``.
 
     The means are over the remembered goals of all leaves below the node. A node without goals has no curve.

@@ -20,9 +20,9 @@ from tensorboardX.event_file_writer import EventsWriter
 from tensorboardX.proto.event_pb2 import Event, SessionLog
 from tensorboardX.proto.summary_pb2 import Summary
 
-from sgimd_torch.board.curves import Behaviour, of_evaluation, of_regions
+from sgimd_torch.board.curves import Behaviour, evaluation_curves, region_curves
 from sgimd_torch.board.legend import as_markdown, meaning_of
-from sgimd_torch.board.pictures import draw
+from sgimd_torch.board.pictures import maps_of
 from sgimd_torch.evaluation import Benchmark, Evaluation
 from sgimd_torch.spaces import Box, Episode
 
@@ -114,7 +114,7 @@ class BoardListener(EventFile):
         self._movements = episode.index + 1
         self._behaviour.episode(episode)
         if self._movements % EVERY == 0:
-            self._scalars({**self._behaviour.curves(), **of_regions(self._learner.regions)})
+            self._scalars({**self._behaviour.curves(), **region_curves(self._learner.regions)})
             if not replayed:
                 self._scalars({f"time/{name.removeprefix('seconds_')}": s for name, s in self._seconds().items()})
         self._scalars(self._curves())
@@ -130,10 +130,10 @@ class BoardListener(EventFile):
         """
         own, goals = evaluations["own"], self._benchmark.goals
         others = {f"error/by_{name}": other.mean_error for name, other in evaluations.items() if name != "own"}
-        self._scalars({**of_evaluation(own, self._benchmark.side / 2), **others})
+        self._scalars({**evaluation_curves(own, self._benchmark.side / 2), **others})
         if movements >= 2 * self._drawn_at or movements == self._config.movements:
             self._drawn_at = movements
-            for tag, picture in draw(self._learner.regions, self._space, goals, own.errors).items():
+            for tag, picture in maps_of(self._learner.regions, self._space, goals, own.errors).items():
                 self._show(tag, summary.image(tag, picture, dataformats="HWC"), "images")
 
     def curves(self) -> Mapping[str, float]:

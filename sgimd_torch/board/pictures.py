@@ -1,6 +1,6 @@
 """The pictures on the board: T from above, coloured by error and by competence.
 
-pictures = draw(regions, space, goals, errors); pictures["map/competence"] is an array of pixels
+pictures = maps_of(regions, space, goals, errors); pictures["map/competence"] is an array of pixels
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ MARGIN: Final = 0.7  # height (inches) of the space above and below the axes tog
 STYLE: Any = {"font.size": 10, "axes.titlesize": 10, "text.parse_math": False}
 
 
-def draw(regions: Sequence[Region], space: Box, goals: Array, errors: Array) -> dict[str, NDArray[np.uint8]]:
+def maps_of(regions: Sequence[Region], space: Box, goals: Array, errors: Array) -> dict[str, NDArray[np.uint8]]:
     """Pictures ``(height, width, 4)`` by tag; if T has more than two dimensions, each picture shows several sections.
 
     Args:

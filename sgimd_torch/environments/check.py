@@ -39,19 +39,19 @@ def check_environment(environment: Environment, *, movements: int = 3) -> list[s
         check_instance(environment)
     stages: list[tuple[Callable[..., Iterator[str]], ...]] = [(_spaces,), (_contexts,), (_outcomes,), (_repeats,)]
     stages.append((_noise, _batches, _refusals))
-    found: list[str] = []
+    findings: list[str] = []
     tried: Movements = ()
     for stage in stages:
         for promise in stage:
             try:
-                found += promise(environment, tried)
+                findings += promise(environment, tried)
             except _RaisedError as error:
-                found.append(str(error))
-        if broken := [each for each in found if not isinstance(each, _Remark)]:
+                findings.append(str(error))
+        if broken := [finding for finding in findings if not isinstance(finding, _Remark)]:
             raise ValueError("\n  ".join([f"{type(environment).__name__} is no environment yet:", *broken]))
         if stage == (_contexts,):
             tried = _movements(environment, movements)
-    return found
+    return findings
 
 
 class _RaisedError(Exception):
@@ -134,11 +134,11 @@ def _repeats(environment: Environment, tried: Movements) -> Iterator[str]:
     if _global_streams() != before:
         yield _drew_from_global("execute()")
         return
-    found = f"execute() gave {_text(kept)}, then {_text(again)} for the same movement and equal streams"
+    seen = f"execute() gave {_text(kept)}, then {_text(again)} for the same movement and equal streams"
     if environment.outcome_noise and rng.bit_generator.state == untouched and not np.array_equal(kept, again):
-        yield f"{found}: nothing was drawn from rng; does its noise come from a generator of its own?"
+        yield f"{seen}: nothing was drawn from rng; does its noise come from a generator of its own?"
         return
-    yield from _differ(environment, kept, again, found)
+    yield from _differ(environment, kept, again, seen)
     if np.abs(kept - again).max() > _rounding(environment):
         return
     _call(environment, "execute", *tried[1], stream(2, "execute"))
@@ -151,11 +151,11 @@ def _repeats(environment: Environment, tried: Movements) -> Iterator[str]:
         )
 
 
-def _differ(environment: Environment, one: Array, other: Array, found: str) -> Iterator[str]:
+def _differ(environment: Environment, one: Array, other: Array, seen: str) -> Iterator[str]:
     """A remark if two outcomes of a movement differ by rounding, a broken promise if they differ by more."""
     apart = float(np.abs(one - other).max())
     if apart > _rounding(environment):
-        yield f"{found}: state carries over; does each movement reset positions, speeds and filters?"
+        yield f"{seen}: state carries over; does each movement reset positions, speeds and filters?"
     elif apart:
         yield _Remark(
             f"a repeated movement with an equal stream ends {apart:.2g} away, as by rounding: "
@@ -169,7 +169,9 @@ def _rounding(environment: Environment) -> float:
 
 def _noise(environment: Environment, tried: Movements) -> Iterator[str]:
     announced, dim = float(environment.outcome_noise), environment.outcomes.dim
-    pairs = [[_call(environment, "execute", *each, stream(k, "execute")).copy() for k in (1, 2)] for each in tried]
+    pairs = [
+        [_call(environment, "execute", *movement, stream(k, "execute")).copy() for k in (1, 2)] for movement in tried
+    ]
     scatter = np.sqrt([np.mean(np.square(one - other)) / 2 for one, other in pairs])
     negligible = announced <= _rounding(environment)  # as the trembling of a thing at rest in a simulation
     noisy = scatter[scatter > (_rounding(environment) if negligible else 0)]
@@ -223,18 +225,18 @@ def _refusals(environment: Environment, tried: Movements) -> Iterator[str]:
     for position, (name, box) in enumerate((("context", environment.contexts), ("theta", environment.policies))):
         for value in _invalid(tried[0][position], box):
             context, theta = (value, tried[0][1]) if position == 0 else (tried[0][0], value)
-            found = f"execute() {{}} a {name} of shape {value.shape}, {_text(value)}"
+            slip = f"execute() {{}} a {name} of shape {value.shape}, {_text(value)}"
             try:
                 environment.execute(context, theta, stream(1, "execute"))
             except ValueError as error:
                 if name in str(error) or "one movement" in str(error):
                     continue
-                found = found.format("refused") + f" without naming it ({error})"
+                slip = slip.format("refused") + f" without naming it ({error})"
             except (Exception, SystemExit) as error:
-                found = found.format("failed at") + f" with {type(error).__name__} instead of ValueError"
+                slip = slip.format("failed at") + f" with {type(error).__name__} instead of ValueError"
             else:
-                found = found.format("accepted")
-            yield f"{found}; begin with context, theta = check_movement(self, context, theta)"
+                slip = slip.format("accepted")
+            yield f"{slip}; begin with context, theta = check_movement(self, context, theta)"
             break
 
 

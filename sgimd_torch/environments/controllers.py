@@ -63,17 +63,10 @@ class Sinusoids(Primitive):
         return self.commands.clip((low + high) / 2 + (high - low) / 2 * waves)
 
     def correspondence(self, times: ArrayLike, trajectory: ArrayLike) -> Array:
-        """theta_d, the policy whose commands come nearest to the recorded commands, eq. (6).
+        """theta_d, the policy whose commands come nearest to the recorded commands; see `Translating`.
 
         The fit takes the best frequency of a grid and refines it; for a fixed frequency the fit is linear. The fit is
         exact if no command was clipped.
-
-        Args:
-            times: ``(n_times,)`` s, increasing.
-            trajectory: ``(n_times, n_commands)``, the commands at ``times``.
-
-        Raises:
-            ValueError: shapes do not fit, values are not finite, or times are not sorted.
         """
         from scipy.optimize import minimize_scalar
 
@@ -84,8 +77,8 @@ class Sinusoids(Primitive):
         def fit(pace: float) -> tuple[float, Array]:
             angles = np.multiply(2 * np.pi * self._frequency(pace), times)
             columns = np.stack([np.sin(angles), np.cos(angles), np.ones_like(angles)], axis=1)
-            found = np.linalg.lstsq(columns, waves, rcond=None)[0]  # (3, n_commands)
-            return float(np.square(columns @ found - waves).sum()), found
+            fitted = np.linalg.lstsq(columns, waves, rcond=None)[0]  # (3, n_commands)
+            return float(np.square(columns @ fitted - waves).sum()), fitted
 
         grid = np.linspace(0.0, 1.0, _GRID)
         best = float(min(grid, key=lambda pace: fit(pace)[0]))
@@ -93,8 +86,8 @@ class Sinusoids(Primitive):
         pace = float(minimize_scalar(lambda pace: fit(pace)[0], bounds=around, method="bounded").x)
         sine, cosine, offset = fit(pace)[1]
         phases = np.arctan2(cosine, sine) / (2 * np.pi) % 1.0
-        each = np.stack([np.hypot(sine, cosine), phases, (offset / STEER + 1) / 2], axis=1)
-        return self.policies.clip(np.append(each.ravel(), pace))
+        parameters = np.stack([np.hypot(sine, cosine), phases, (offset / STEER + 1) / 2], axis=1)
+        return self.policies.clip(np.append(parameters.ravel(), pace))
 
     def _frequency(self, pace: float) -> float:
         lowest, highest = self.frequencies

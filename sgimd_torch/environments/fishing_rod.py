@@ -83,21 +83,7 @@ class FishingRod:
         return self.contexts.sample(rng)
 
     def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
-        """Run one movement.
-
-        Args:
-            context: ``(context_dim,)`` inside ``contexts``.
-            theta: ``(25,)`` in [0, 1].
-            rng: random stream of the motor noise; the number of draws does not depend on theta.
-
-        Returns:
-            ``(2,)`` m, landing point of the float.
-
-        Raises:
-            ValueError: an argument has another shape, is not finite, or lies outside its box.
-            TypeError: ``rng`` is not a Generator.
-            SimulationError: the simulation diverged; the message names theta.
-        """
+        """``(2,)`` m, landing point of the float; the number of draws does not depend on theta. See `Environment`."""
         context, theta = check_movement(self, context, theta)
         (landing,) = self._execute(context[None], theta[None], [rng])
         if np.isnan(landing).any():
@@ -105,14 +91,7 @@ class FishingRod:
         return landing
 
     def execute_many(self, contexts: Array, thetas: Array, rngs: Sequence[np.random.Generator]) -> Array:
-        """``(n, 2)`` m, landing points; NaN if a simulation diverged.
-
-        Row i equals ``execute(contexts[i], thetas[i], rngs[i])`` bit for bit. The arguments are not checked; the
-        function `execute_many` of ``protocol.py`` does that.
-
-        Raises:
-            TypeError: see ``execute``.
-        """
+        """``(n, 2)`` m, landing points; NaN if a simulation diverged. See `BatchEnvironment`."""
         # Each block has as many steps as its longest movement, so movements of similar duration share a block.
         order = thetas[:, -1].argsort(kind="stable")
         outcomes = np.empty((len(thetas), self.outcomes.dim))
@@ -129,19 +108,7 @@ class FishingRod:
         return self._caster.trace(outcome, commands, end, float(context.sum()))
 
     def replay(self, times: ArrayLike, trajectory: ArrayLike) -> Array:
-        """Let the arm follow a recorded trajectory, without noise and without wind.
-
-        Args:
-            times: ``(n_times,)`` s, increasing from 0.
-            trajectory: ``(n_times, 6)`` rad.
-
-        Returns:
-            ``(2,)`` m, landing point of the float.
-
-        Raises:
-            ValueError: shapes do not fit, values are not finite, or times do not increase from 0 or exceed 60 s.
-            SimulationError: the simulation diverged.
-        """
+        """``(2,)`` m, landing point if the arm follows a recording of at most 60 s, without wind; see `Replaying`."""
         times, trajectory = check_recording(times, trajectory, len(JOINTS), longest=LONGEST)
         if times[0] != 0:
             raise ValueError(f"times must start at 0, got {times[0]}; subtract the first one")

@@ -105,12 +105,10 @@ class FromGymnasium:
         return self._seen(int(rng.integers(STARTS)))
 
     def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
-        """``(outcome_dim,)``, the outcome of one episode.
+        """``(outcome_dim,)``, the outcome of one episode; see `Environment`.
 
         Raises:
-            ValueError: ``theta`` is not one point of Pi, ``context`` is never observed, or the function ``outcome``
-                returns no outcome.
-            TypeError: ``rng`` is not a Generator.
+            ValueError: ``context`` is never observed, or the function ``outcome`` returns no outcome.
             SimulationError: MuJoCo gave a warning, or the outcome is not finite.
         """
         context, theta = check_movement(self, context, theta)
@@ -125,15 +123,9 @@ class FromGymnasium:
         return self._play(actions, seed, theta, None if self._context is None else rng)
 
     def replay(self, times: ArrayLike, trajectory: ArrayLike) -> Array:
-        """``(outcome_dim,)``, the outcome of recorded actions, always from the same start.
+        """``(outcome_dim,)``, the outcome of recorded actions, always from the same start; see `Replaying`.
 
-        Args:
-            times: ``(n_times,)`` s, increasing from 0.
-            trajectory: ``(n_times, action_dim)``, actions at ``times``; between them they are interpolated.
-
-        Raises:
-            ValueError: shapes do not fit, or the recording has more than the ``steps`` of a movement.
-            SimulationError: see ``execute``.
+        Between recorded actions they are interpolated.
         """
         width, longest = self._actions.shape[0], self.dt * (self.steps - 1)
         times, actions = check_recording(times, trajectory, width, longest=longest)

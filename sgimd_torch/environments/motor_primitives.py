@@ -85,27 +85,16 @@ class GaussianPrimitive(Primitive):
         first = weights * apart
         second = weights * (apart**2 - (first * slopes).sum(axis=1, keepdims=True))
         # The weights sum to 1, so their derivatives sum to 0: the positive ones sum to half of all absolute values.
-        speed, acceleration = (np.abs(each).sum(axis=1).max() / 2 for each in (first, second))
+        speed, acceleration = (np.abs(derivative).sum(axis=1).max() / 2 for derivative in (first, second))
         return self.joints.sides * speed / self.durations[0], self.joints.sides * acceleration / self.durations[0] ** 2
 
     def correspondence(self, times: ArrayLike, trajectory: ArrayLike) -> Array:
-        """theta_d, the policy that reproduces a demonstrated trajectory most closely, eq. (6).
+        """theta_d, the policy that reproduces a demonstrated trajectory most closely; see `Translating`.
 
         delta is the duration of the demonstration. If this is below the shortest duration, the demonstration is slowed
         down; if it is above the longest duration, the demonstration is refused, as a faster movement would be another
         movement. For a fixed delta eq. (5) is linear in the knots, so each joint is one bounded linear least squares
-        problem, which is solved by the paper's algorithm (trust-region reflective).
-
-        Args:
-            times: ``(n_times,)`` s, increasing, at least ``n_knots`` of them.
-            trajectory: ``(n_times, n_joints)`` rad.
-
-        Returns:
-            ``(theta_dim,)`` in [0, 1].
-
-        Raises:
-            ValueError: shapes do not fit, there are too few samples, values are not finite, times are not sorted, or
-                the recording lasts longer than the longest movement.
+        problem, which is solved by the paper's algorithm (trust-region reflective). There must be ``n_knots`` samples.
         """
         from scipy.optimize import lsq_linear  # only here, because this import takes longer than all of sgimd_torch
 

@@ -95,8 +95,8 @@ def load_model(path: Path, joints: Sequence[str]) -> tuple[mujoco.MjModel, list[
         for mesh in spec.meshes:
             mesh.file = _of_package(path, mesh.file)
         for kind in (spec.bodies, spec.sites):  # a hand leads an arm by a name
-            for k, each in enumerate(kind):
-                each.name = each.name or f"unnamed_{k}"
+            for k, element in enumerate(kind):
+                element.name = element.name or f"unnamed_{k}"
         spec.compiler.fusestatic = False  # else links on fixed joints of a URDF, such as its tool, lose their names
         model = spec.compile()
         if model.nu:
@@ -110,9 +110,9 @@ def load_model(path: Path, joints: Sequence[str]) -> tuple[mujoco.MjModel, list[
 
 def files_of(path: Path) -> list[Path]:
     """The file of a model, and all files that it includes or refers to, such as meshes."""
-    spec, found = mujoco.MjSpec.from_file(str(path)), {path, *map(Path, mujoco.mju_getXMLDependencies(str(path)))}
-    found |= {path.parent / spec.meshdir / _of_package(path, each.file) for each in spec.meshes if each.file}
-    return sorted({each.resolve() for each in found if each.is_file()})
+    spec, files = mujoco.MjSpec.from_file(str(path)), {path, *map(Path, mujoco.mju_getXMLDependencies(str(path)))}
+    files |= {path.parent / spec.meshdir / _of_package(path, mesh.file) for mesh in spec.meshes if mesh.file}
+    return sorted({file.resolve() for file in files if file.is_file()})
 
 
 def outcome_places(model: mujoco.MjModel, outcome: str) -> list[Place]:
@@ -132,7 +132,7 @@ def outcome_places(model: mujoco.MjModel, outcome: str) -> list[Place]:
             raise ValueError(f"outcome {text!r}: {axes!r} are no axes; write some of x, y and z, for a joint nothing")
         axes = axes or _AXES if kind != "joint" else ""
         places.append(Place(kind, name, place.number, tuple(map(_AXES.index, axes)), place.unit, place.address))
-    if len({each.unit for each in places}) > 1:
+    if len({place.unit for place in places}) > 1:
         raise ValueError(f"outcome {outcome!r} mixes lengths (m) and angles (rad); a goal needs one unit")
     return places
 
@@ -229,11 +229,11 @@ def positions(model: mujoco.MjModel, actuators: Sequence[int]) -> tuple[str, ...
 
 def moved_by(model: mujoco.MjModel, actuators: Sequence[int]) -> list[int]:
     """Bodies that a joint of one of ``actuators`` moves, from the base outwards; all if they act on no joint."""
-    found = {int(model.jnt_bodyid[joint]) for k in actuators if (joint := joint_of(model, k)) is not None}
+    bodies = {int(model.jnt_bodyid[joint]) for k in actuators if (joint := joint_of(model, k)) is not None}
     for body in range(1, model.nbody):  # a parent has a lower number
-        if int(model.body_parentid[body]) in found:
-            found.add(body)
-    return sorted(found) or [*range(1, model.nbody)]
+        if int(model.body_parentid[body]) in bodies:
+            bodies.add(body)
+    return sorted(bodies) or [*range(1, model.nbody)]
 
 
 def hand_of(model: mujoco.MjModel, place: Place, bodies: Sequence[int]) -> Place:
@@ -277,7 +277,7 @@ def _find(model: mujoco.MjModel, what: str, kind: str, name: str) -> Place:
         raise ValueError(f"{what}: write KIND:NAME, such as site:tip; kinds are {', '.join(_COUNTS)}")
     names = _names(model, kind)
     if name not in names:
-        others = [f"; write {each}:{name}" for each in _COUNTS if name in _names(model, each)]
+        others = [f"; write {other}:{name}" for other in _COUNTS if name in _names(model, other)]
         near = did_you_mean(name, names, 3) or f"; {kind}s with a name: {', '.join(names[:20]) or 'none'}"
         raise ValueError(f"{what}: the model has no {kind} {name!r}{others[0] if others else near}")
     number = int(getattr(model, kind)(name).id)
@@ -316,7 +316,7 @@ def _serve(spec: mujoco.MjSpec, model: mujoco.MjModel, joints: Sequence[str]) ->
             mujoco.mj_mulM(model, data, product, unit)
             inertias[dof] = max(inertias[dof], product[dof])
     for k in chosen:
-        name, inertia, load = model.joint(k).name, *(each[model.jnt_dofadr[k]] for each in (inertias, loads))
+        name, inertia, load = model.joint(k).name, *(numbers[model.jnt_dofadr[k]] for numbers in (inertias, loads))
         stiffness = max(inertia * _FREQUENCY**2, load / _SAG)
         servo = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
         servo.set_to_position(kp=stiffness, kv=2 * np.sqrt(stiffness * inertia))

@@ -93,7 +93,7 @@ class MujocoRobot:
     Attributes:
         bodies: indices of the bodies that the joints of the robot move.
         files: model file, and files that it includes.
-        found: T, ``rest`` and ``outcome_noise``, as options.
+        found_options: T, ``rest`` and ``outcome_noise``, as options.
         joints: names of the joints whose positions the commands are; () if they are anything else, such as torques.
         remarks: sentences for the user, for example about T.
 
@@ -102,7 +102,7 @@ class MujocoRobot:
         OSError: there is no such file.
     """
 
-    FOUND: ClassVar = ("low", "high", "rest", "outcome_noise")
+    FOUND_OPTIONS: ClassVar = ("low", "high", "rest", "outcome_noise")
 
     def __init__(
         self,
@@ -154,15 +154,15 @@ class MujocoRobot:
         self._dim = len(names)
         still = check_point("rest", rest, self._dim) if rest else self._still_outcome(path.name)
         if low or high:
-            corners = [check_point(name, each, self._dim) for name, each in (("low", low), ("high", high))]
+            corners = [check_point(name, corner, self._dim) for name, corner in (("low", low), ("high", high))]
         else:
             corners = self._explored(still, names, path.name)
         self.outcomes = Box(corners[0], corners[1], tuple(names), self._places[0].unit)
         self.rest = read_only(still if rest else self.outcomes.clip(np.round(still, 3)))
         self.outcome_noise = max(TREMBLE, self._scatter()) if outcome_noise is None else outcome_noise
         check_robot(self)
-        points = [tuple(each.tolist()) for each in (self.outcomes.low, self.outcomes.high, self.rest)]
-        self.found = dict(zip(self.FOUND, (*points, self.outcome_noise), strict=True))
+        points = [tuple(point.tolist()) for point in (self.outcomes.low, self.outcomes.high, self.rest)]
+        self.found_options = dict(zip(self.FOUND_OPTIONS, (*points, self.outcome_noise), strict=True))
 
     @property
     def start(self) -> Array:
@@ -180,13 +180,7 @@ class MujocoRobot:
         return self.contexts.sample(rng)
 
     def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
-        """``(outcome_dim,)``, the outcome of one movement.
-
-        Raises:
-            ValueError: ``context`` is not one point of C, or ``theta`` is not one point of Pi.
-            TypeError: ``rng`` is not a Generator.
-            SimulationError: the simulation diverged; the message names theta.
-        """
+        """``(outcome_dim,)``, the outcome of one movement; see `Environment`."""
         context, theta = check_movement(self, context, theta)
         outcome = self.execute_many(context[None], theta[None], [rng])[0]
         if np.isnan(outcome).any():
@@ -194,7 +188,7 @@ class MujocoRobot:
         return outcome
 
     def execute_many(self, contexts: Array, thetas: Array, rngs: Sequence[np.random.Generator]) -> Array:
-        """``(n, outcome_dim)``, outcomes, NaN if a simulation diverged; row i equals ``execute`` for row i."""
+        """``(n, outcome_dim)``, outcomes; NaN if a simulation diverged. See `BatchEnvironment`."""
         commands = [self._commands(theta, rng) for theta, rng in zip(thetas, rngs, strict=True)]
         outcomes = np.empty((len(thetas), self._dim))
         for start in range(0, len(thetas), _BLOCK):
@@ -212,11 +206,11 @@ class MujocoRobot:
         if states is None:
             raise SimulationError(f"the simulation diverged in context {context.tolist()}", theta)
         every = max(1, round(1 / (_FRAMES * self.model.opt.timestep)))
-        shown = states[::-every][::-1]  # the last drawing shows the outcome
-        drawn = [self._drawing(state, states[0]) for state in shown]
-        chains = [np.stack(each) for each in zip(*drawn, strict=True)]
-        path = np.stack([self._measured(state) for state in shown])
-        return Filmed(self._outcome(states), every * self.model.opt.timestep, chains, shown, path)
+        frames = states[::-every][::-1]  # the last drawing shows the outcome
+        drawn = [self._drawing(state, states[0]) for state in frames]
+        chains = [np.stack(drawings) for drawings in zip(*drawn, strict=True)]
+        path = np.stack([self._measured(state) for state in frames])
+        return Filmed(self._outcome(states), every * self.model.opt.timestep, chains, frames, path)
 
     def start_in(self, context: Array) -> Array:
         """The full physics state in which a movement begins in a context ``(context_dim,)``."""
@@ -237,15 +231,15 @@ class MujocoRobot:
             outcomes: outcomes, or goals.
             start: full physics state in which the movement begins.
         """
-        found = np.tile(self._measured(start), (len(outcomes), 1, 1))
+        located = np.tile(self._measured(start), (len(outcomes), 1, 1))
         row = column = 0
         for place in self._places:
             if place.axes:
-                found[:, row, place.axes] *= self._displacement
-                found[:, row, place.axes] += outcomes[:, column : column + len(place.axes)]
+                located[:, row, place.axes] *= self._displacement
+                located[:, row, place.axes] += outcomes[:, column : column + len(place.axes)]
                 row += 1
             column += len(place.names)
-        return found
+        return located
 
     def _measured(self, state: Array) -> Array:
         """``(n_places, 3)`` m, the world positions of the measured places; joints have none."""
@@ -261,7 +255,7 @@ class MujocoRobot:
         origin, data = self._displacement * self._measured(start)[0], self._at(state)
         arm = [*data.xpos[path_to(self.model, body_of(self.model, self._hand))], self._hand.position(data)]
         objects = [k for k in range(1, self.model.nbody) if self.model.body_jntnum[k] and k not in self.bodies]
-        others = [each.position(data) for each in self._places[self._hand is place :] if each.axes]
+        others = [other.position(data) for other in self._places[self._hand is place :] if other.axes]
         axes = [*place.axes, *(k for k in range(3) if k not in place.axes)][:2]
         chains = np.stack(arm), *data.xpos[objects][:, None], *np.reshape(others, (-1, 1, 3))
         return [(chain - origin)[:, axes] for chain in chains]
@@ -302,15 +296,17 @@ class MujocoRobot:
     def _simulate(self, contexts: Array, commands: Sequence[Array]) -> list[Array | None]:
         """States of each movement, the first one before its first step; None if the simulation diverged."""
         starts = np.stack([self.start_in(context) for context in contexts])
-        n_steps = [len(each) for each in commands]
-        controls = np.stack([np.pad(each, ((0, max(n_steps) - len(each)), (0, 0)), "edge") for each in commands])
+        n_steps = [len(sequence) for sequence in commands]
+        controls = np.stack(
+            [np.pad(sequence, ((0, max(n_steps) - len(sequence)), (0, 0)), "edge") for sequence in commands]
+        )
         run, _ = self._pool.rollout(self.model, self._data, starts, controls)
-        found = list[Array | None]()
+        simulated = list[Array | None]()
         for start, states, n in zip(starts, run, n_steps, strict=True):
             # A diverging simulation stops, or begins again at the time 0; the first entry of a state is its time.
             right = abs(states[n - 1, 0] - n * self.model.opt.timestep) < self.model.opt.timestep / 2
-            found.append(np.concatenate([start[None], states[:n]]) if right else None)
-        return found
+            simulated.append(np.concatenate([start[None], states[:n]]) if right else None)
+        return simulated
 
     def _outcome(self, states: Array | None) -> Array:
         if states is None:

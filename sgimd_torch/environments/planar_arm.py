@@ -63,18 +63,13 @@ class PlanarArm:
         return self.contexts.sample(rng)
 
     def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
-        """``(2,)`` m, position of the end after one movement.
-
-        Raises:
-            ValueError: ``context`` is not one point of C, or ``theta`` is not one point of Pi.
-            TypeError: ``rng`` is not a Generator.
-        """
+        """``(2,)`` m, position of the end after one movement; see `Environment`."""
         context, theta = check_movement(self, context, theta)
         return self._end(context, self._moved(theta, rng))
 
     def execute_many(self, contexts: Array, thetas: Array, rngs: Sequence[np.random.Generator]) -> Array:
         """``(n, 2)`` m, outcomes of movements side by side; row i equals ``execute`` for row i bit for bit."""
-        return self._end(contexts, np.stack([self._moved(*each) for each in zip(thetas, rngs, strict=True)]))
+        return self._end(contexts, np.stack([self._moved(*movement) for movement in zip(thetas, rngs, strict=True)]))
 
     def trace(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Sketch:
         """Drawings of a movement: in 1 s all joints turn smoothly from the straight arm to their angles."""
@@ -96,20 +91,9 @@ class PlanarArm:
         return (2 * self.policies.check("theta", theta, "was a goal passed instead?") - 1) * self._limits
 
     def correspondence(self, times: ArrayLike, trajectory: ArrayLike) -> Array:
-        """theta_d, the policy that ends in the last posture of a demonstrated trajectory: the inverse of ``angles``.
+        """theta_d, the policy that ends in the last posture of a demonstrated trajectory; see `Translating`.
 
         The outcome depends only on the last posture, and theta_d reproduces this posture; so theta_d solves eq. (6).
-
-        Args:
-            times: ``(n_times,)`` s, increasing.
-            trajectory: ``(n_times, n_joints)`` rad.
-
-        Returns:
-            ``(n_joints,)`` in [0, 1].
-
-        Raises:
-            ValueError: shapes do not fit, values are not finite, times are not sorted, or the joints cannot take the
-                last posture.
         """
         _, trajectory = check_recording(times, trajectory, self.policies.dim, samples=1)
         turned = trajectory[-1] / self._limits

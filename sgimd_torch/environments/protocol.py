@@ -57,6 +57,7 @@ class Environment(Protocol):
 
         Raises:
             ValueError: ``context`` is not one point of C or ``theta`` is not one point of Pi; see `check_movement`.
+            TypeError: ``rng`` is not a Generator.
             SimulationError: there is no finite outcome.
         """
         ...
@@ -89,7 +90,15 @@ class Translating(Protocol):
     """An environment that can translate demonstrations."""
 
     def correspondence(self, times: Array, trajectory: Array) -> Array:
-        """theta_d ``(theta_dim,)``, eq. (6); ``times`` ``(n_times,)`` s, ``trajectory`` ``(n_times, n_joints)``."""
+        """theta_d ``(theta_dim,)``, the policy that reproduces a demonstrated trajectory most closely, eq. (6).
+
+        Args:
+            times: ``(n_times,)`` s, increasing.
+            trajectory: ``(n_times, n_joints)``, angles (rad) or commands.
+
+        Raises:
+            ValueError: this is no recording, see `check_recording`, or the robot cannot make such a movement.
+        """
         ...
 
 
@@ -98,7 +107,12 @@ class Replaying(Protocol):
     """An environment that can follow a recording sample by sample."""
 
     def replay(self, times: Array, trajectory: Array) -> Array:
-        """``(outcome_dim,)``; ``times`` ``(n_times,)`` s from 0, ``trajectory`` ``(n_times, n_joints)``."""
+        """``(outcome_dim,)``, without noise; ``times`` ``(n_times,)`` s from 0, ``trajectory`` ``(n_times, n_joints)``.
+
+        Raises:
+            ValueError: this is no recording, see `check_recording`.
+            SimulationError: there is no finite outcome.
+        """
         ...
 
 
@@ -128,13 +142,13 @@ class FromFiles(Protocol):
     Attributes:
         files: files whose checksums a run keeps.
         remarks: sentences for the user.
-        found: values of the options that the environment finds by movements if they are not given. A run keeps them in
-            its settings, so they are found once. The class lists the names of these options as ``FOUND``.
+        found_options: values of the options that the environment finds by movements if they are not given. A run keeps
+            them in its settings, so they are found once. ``FOUND_OPTIONS`` of the class has their names.
     """
 
     files: Sequence[Path]
     remarks: Sequence[str]
-    found: Mapping[str, Any]
+    found_options: Mapping[str, Any]
 
 
 def primitive_of(environment: Environment) -> Primitive:

@@ -54,8 +54,8 @@ class Sketch:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "outcome", _drawn("outcome", self.outcome, "(outcome_dim,)", 1))
-        chains = tuple(_drawn("each chain", each, "(n_steps, n_points, 2)", 3) for each in self.chains)
-        shapes = [each.shape for each in chains]
+        chains = tuple(_drawn("each chain", chain, "(n_steps, n_points, 2)", 3) for chain in self.chains)
+        shapes = [chain.shape for chain in chains]
         if len({shape[0] for shape in shapes}) != 1 or any(shape[2] != 2 for shape in shapes):
             raise ValueError(
                 f"chains of a Sketch must be one array (n_steps, n_points, 2) or more, got shapes {shapes}"
@@ -98,13 +98,13 @@ def traced(environment: Environment, trace: Tracer, context: Array, theta: Array
     """
     name, dim = type(environment).__name__, environment.outcomes.dim
     try:
-        found = trace(context, theta, rng)
+        movement = trace(context, theta, rng)
     except Exception as error:  # code of the user may raise anything
         raise ValueError(f"trace() of {name} failed: {type(error).__name__}: {error}") from error
-    if hasattr(found, "states"):  # the RodTrace of the fishing rod
-        return found
-    if not isinstance(found, Sketch) or len(found.outcome) != dim:
-        what = f"one of {len(found.outcome)}" if isinstance(found, Sketch) else type(found).__name__
+    if hasattr(movement, "states"):  # the RodTrace of the fishing rod
+        return movement
+    if not isinstance(movement, Sketch) or len(movement.outcome) != dim:
+        what = f"one of {len(movement.outcome)}" if isinstance(movement, Sketch) else type(movement).__name__
         wanted = f"a Sketch with an outcome of {dim} dimension{'s' * (dim != 1)}"
         raise ValueError(f"trace() of {name} must give {wanted}, got {what}")
-    return found
+    return movement

@@ -120,6 +120,6 @@ def sections(space: Box) -> list[Section]:
     return [Section(space, pair) for pair in pairs]
 
 
-def of_regions(lows: Array, highs: Array, space: Box) -> list[Section]:
+def sections_of_regions(lows: Array, highs: Array, space: Box) -> list[Section]:
     """The pictures of the part of T (``space``) that regions with corners ``(n, context_dim + outcome_dim)`` cover."""
     return sections(replace(space, low=lows.min(axis=0)[-space.dim :], high=highs.max(axis=0)[-space.dim :]))

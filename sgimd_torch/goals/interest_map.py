@@ -105,7 +105,7 @@ class InterestMap(Goals):
             # Deviation: the paper leaves open what happens without a valid cut. Here the oldest quarter is forgotten.
             regions[index] = region.keep(slice(len(region.goals) // 4, None))
         else:
-            self._tiling.plant([*regions[:index], *region.split(*cut), *regions[index + 1 :]])
+            self._tiling.tile([*regions[:index], *region.split(*cut), *regions[index + 1 :]])
 
     def _best_cut(self, region: Region) -> tuple[int, float] | None:
         """(axis, cut) with the largest n1 * n2 * contrast; None when no cut is valid.

@@ -3,7 +3,7 @@
 Sections 3.2.1 and 3.2.2, eqs. (3) and (4) of Nguyen & Oudeyer (2014). The interest of a region is its competence
 progress, over a sliding window of the last goals that were attempted there. A map cuts C x T into regions and gives
 them to a `Tiling`.
-    tiling.plant(regions); goal = tiling.sample(context); index = tiling.add(context, goal, competence, strategy, gain)
+    tiling.tile(regions); goal = tiling.sample(context); index = tiling.add(context, goal, competence, strategy, gain)
 """
 
 from __future__ import annotations
@@ -160,14 +160,14 @@ class Tiling:
         self.problem, self._near, self._progress, self._rng = problem, near, progress, problem.stream("goals")
         contexts, outcomes = problem.contexts, problem.outcomes
         self.box = Box(np.concatenate((contexts.low, outcomes.low)), np.concatenate((contexts.high, outcomes.high)))
-        self.plant([self.region("R", self.box.low, self.box.high)])
+        self.tile([self.region("R", self.box.low, self.box.high)])
 
     def region(self, path: str, low: Array, high: Array) -> Region:
         """A region without goals."""
         nothing = np.empty((0, self.box.dim)), np.empty(0), np.empty(0), np.empty(0, dtype=np.str_)
         return Region(path, low, high, self.problem.contexts.dim, *nothing, 0, self._progress)
 
-    def plant(self, regions: list[Region]) -> None:
+    def tile(self, regions: list[Region]) -> None:
         """Use these regions from now on; they must tile C x T."""
         self.regions = regions
         self._lows = np.stack([region.low for region in regions])

@@ -351,7 +351,7 @@ class Learner:
         slot.begin(self.autonomous.attempt(context), context)
 
     def _propose(self, slot: RobotSlot, context: Array | Failure) -> Move | Failure | None:
-        """The next movement of a robot; a new attempt begins if none is under way tslot."""
+        """The next movement of a robot; a new attempt begins if none is under way."""
         if isinstance(context, Failure):
             return context
         for _ in range(2):  # the attempt under way may end with a request that gets no reply
@@ -364,7 +364,7 @@ class Learner:
         raise RuntimeError(f"{type(self.autonomous).__name__}.attempt() has to yield at least once")
 
     def _within_pi(self, move: Move | None) -> Move | None:
-        """The movement, which may go to a robot; a theta that is no point of Pi never does."""
+        """The movement, after a check that its theta is a point of Pi; no other theta may go to a robot."""
         if move is None:
             return move
         pi, theta = self.problem.policies, move.theta
@@ -375,7 +375,7 @@ class Learner:
         return move
 
     def _checked(self, move: Move | Failure | None, outcome: ArrayLike | Failure | None) -> Array | Failure | None:
-        """What came of a movement; a rest without anything is None."""
+        """The outcome or the failure of a movement, after its check; None for a rest."""
         if isinstance(outcome, Failure):
             return outcome
         if isinstance(move, Move) and outcome is not None:

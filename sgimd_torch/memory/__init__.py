@@ -12,7 +12,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.memory.neighbours import PolicyNeighbours, Rows, Table, TreeNeighbours
+from sgimd_torch.memory.neighbours import Neighbours, Rows
+from sgimd_torch.memory.table import Table
 from sgimd_torch.spaces import Array, check_point
 
 __all__ = ["Memory", "Rows"]
@@ -42,8 +43,8 @@ class Memory:
         self.context_dim, self.theta_dim, self.outcome_dim = context_dim, theta_dim, outcome_dim
         self._contexts, self._thetas, self._outcomes = Table(context_dim), Table(theta_dim), Table(outcome_dim)
         # A key is a context followed by an outcome or by a theta; without contexts, outcomes and thetas are the keys.
-        self._outcome_side = TreeNeighbours(Table(context_dim + outcome_dim) if context_dim else self._outcomes)
-        self._policy_side = PolicyNeighbours(Table(context_dim + theta_dim) if context_dim else self._thetas)
+        self._outcome_side = Neighbours(Table(context_dim + outcome_dim) if context_dim else self._outcomes)
+        self._policy_side = Neighbours(Table(context_dim + theta_dim) if context_dim else self._thetas)
         self._range = np.stack((np.full(theta_dim, np.inf), np.full(theta_dim, -np.inf)))
 
     def __len__(self) -> int:
@@ -94,17 +95,17 @@ class Memory:
         """Rows ``(min(k, n),)`` whose contexts and outcomes lie nearest to ``context`` and ``goal`` ``(outcome_dim,)``,
         nearest first; of equally near rows, the oldest first."""
         goal = check_point("goal", goal, self.outcome_dim, "was a theta passed instead?")
-        return self._outcome_side.nearest(self._key(context, goal), k)
+        return self._outcome_side.nearest_to(self._key(context, goal), k)
 
     def near_policies(self, context: ArrayLike, theta: ArrayLike, k: int, within: float = np.inf) -> Rows:
         """At most ``k`` rows whose contexts and thetas lie nearest to ``context`` and ``theta`` ``(theta_dim,)``, not
         farther than ``within``.
 
-        With more than ``EXACT_UP_TO`` exemplars in memory some of these rows may be missing, see `PolicyNeighbours`.
+        With more than ``EXACT_UP_TO`` exemplars in memory some of these rows may be missing, see `Neighbours`.
         """
         theta = check_point("theta", theta, self.theta_dim, "was a goal passed instead?")
-        (found,) = self._policy_side.nearest(self._key(context, theta)[None], k, within)
-        return found[found >= 0]
+        (rows,) = self._policy_side.nearest(self._key(context, theta)[None], k, within)
+        return rows[rows >= 0]
 
     def neighbourhoods(self, rows: Rows, k: int, within: float = np.inf) -> Rows:
         """Result of :meth:`near_policies` for the context and theta of each of ``rows``, ``(len(rows), min(k, n))``,
@@ -117,9 +118,9 @@ class Memory:
         Raises:
             ValueError: the memory has other dimensions of context, theta or outcome.
         """
-        found = self.context_dim, self.theta_dim, self.outcome_dim
-        if found != dims:
-            raise ValueError(f"a memory to start from must have dims {dims} of context, theta, outcome, got {found}")
+        own = self.context_dim, self.theta_dim, self.outcome_dim
+        if own != dims:
+            raise ValueError(f"a memory to start from must have dims {dims} of context, theta, outcome, got {own}")
         return self.copy()
 
     def copy(self) -> Memory:

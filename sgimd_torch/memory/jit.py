@@ -14,7 +14,7 @@ inner = njit(nogil=True, fastmath=_FAST)
 NUMBER, NUMBERS = types.float64, types.Array(types.float64, 1, "C", readonly=True)
 TABLE, ROWS = types.Array(types.float64, 2, "C", readonly=True), types.Array(types.int64, 1, "C", readonly=True)
 LISTS = types.Array(types.int64, 2, "C", readonly=True)
-SEEN, FOUND, SQUARED = (types.Array(kind, dim, "C") for kind, dim in ((types.int64, 1), (types.int64, 2), (NUMBER, 2)))
+CHANGED_LISTS, CHANGED_TABLE = types.Array(types.int64, 2, "C"), types.Array(types.float64, 2, "C")
 
 
 def compiled_for(*arguments: types.Type) -> Any:
@@ -34,8 +34,8 @@ def squared_distance(one: Array, other: Array) -> float:
 @inner
 def columns(table: Array, rows: np.ndarray) -> Array:
     """``(dim, n)``, these rows of a table."""
-    found = np.empty((table.shape[1], len(rows)))
+    selected = np.empty((table.shape[1], len(rows)))
     for j in range(len(rows)):
-        for k in range(len(found)):
-            found[k, j] = table[rows[j], k]
-    return found
+        for k in range(len(selected)):
+            selected[k, j] = table[rows[j], k]
+    return selected

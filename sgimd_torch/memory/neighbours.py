@@ -1,243 +1,164 @@
-"""Nearest rows of a growing table: by comparing all rows, or, for very many rows, by a tree or by cells.
+"""Nearest rows of a growing table, by an index of faiss.
 
 The memory uses it to find outcomes near a goal (section 4.4.2 of Nguyen & Oudeyer, 2014: H of eq. 8) and movements
-like a given one (K_h). If scipy or faiss proposes rows, float64 distances decide; equally near rows keep their order.
-    side = TreeNeighbours(Table(2)); side.keys.append(keys); rows = side.nearest(query, k=10)
-Results depend on the rows alone, not on earlier queries. A query first adds new rows to the tree or the index.
+like a given one (K_h). Faiss computes distances in single precision; those that may be among the least are computed
+anew in double precision. Of equally near rows the oldest comes first. Results depend on the rows alone.
+    side = Neighbours(Table(2)); side.keys.append(keys); rows = side.nearest(queries, k=10)
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from threading import Lock
-from typing import Final, NamedTuple, Self
+from threading import RLock
+from typing import Any, Final
 
 import faiss
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from sgimd_torch.memory.compiled import compiled
+from sgimd_torch.memory.table import Table
 from sgimd_torch.spaces import Array
 
 Rows = NDArray[np.int64]
+Single = NDArray[np.float32]
 
-EXACT_UP_TO: Final = 2**15  # largest number of rows for which `PolicyNeighbours` is exact; for more it is approximate
-LISTED: Final = 20  # number of neighbours of a row that are kept
-_SPARE: Final = 8  # number of proposals beyond k, so that the last is nearly always clearly farther than the k-th
-_LARGEST32: Final = float(np.finfo(np.float32).max)
-_ROUNDING: Final = 1e-9  # relative error far above the rounding of float64 distances
+EXACT_UP_TO: Final = 10**5  # largest number of rows for which neighbours are exact; for more, nearly all are found
+LISTED: Final = 20  # number of neighbours in the list of a row
+_SPARE: Final = 8  # number of rows beyond k that cells propose
+_MOST: Final = 1e15  # largest coordinate in single precision, so that squared distances do not overflow
+_FAST: Final = 1, 2, 4, 8, 12  # dimensions for which faiss is several times faster; points get zeros up to these
 
 faiss.omp_set_num_threads(1)  # queries last microseconds, and waking threads costs more than it saves
-# With more queries at once than this, faiss would round distances otherwise than for one query.
-faiss.cvar.distance_compute_blas_threshold = 2**20
 
 
-class Table:
-    """Rows in an array that doubles its size when full."""
-
-    def __init__(self, dim: int) -> None:
-        self._room = np.empty((64, dim))
-        self._rows: Array | None = None
-        self._n = 0
-
-    def __len__(self) -> int:
-        return self._n
-
-    @property
-    def dim(self) -> int:
-        """Number of columns."""
-        return self._room.shape[1]
-
-    @property
-    def rows(self) -> Array:
-        """``(n, dim)`` read-only; rows that are added later do not appear in it."""
-        if self._rows is None:
-            self._rows = self._room[: self._n]
-            self._rows.flags.writeable = False
-        return self._rows
-
-    def append(self, rows: Array) -> None:
-        """Add ``(m, dim)`` rows."""
-        n_old, n_new = self._n, self._n + len(rows)
-        if n_new > len(self._room):
-            room = np.empty((max(n_new, 2 * len(self._room)), self.dim))
-            room[:n_old] = self._room[:n_old]
-            self._room = room
-        self._room[n_old:n_new] = rows
-        self._rows, self._n = None, n_new
-
-
-class TreeNeighbours:
-    """Exact neighbours in few dimensions: a tree of all rows but the newest, which are compared one by one."""
-
-    _NEWEST: Final = 2**13  # most rows outside the tree, or a thirty-second of the tree if that is more
-
-    def __init__(self, keys: Table) -> None:
-        self.keys = keys
-        self._tree: cKDTree | None = None
-        self._n_in_tree = 0
-        self._last = b"", Found.none(keys.rows[:0], 0), 0  # last query, its neighbours, and how many rows were compared
-
-    def nearest(self, query: Array, k: int) -> Rows:
-        """The ``(min(k, n),)`` rows nearest to ``query`` ``(dim,)``, nearest first. If the query is that of the last
-        call, only newer rows are compared.
-
-        Raises:
-            ValueError: ``k`` is below 1.
-        """
-        _check_k(k)
-        keys, n = self.keys.rows, len(self.keys)
-        (asked, found, seen), key = self._last, query.tobytes()
-        if asked != key or k > found.rows.shape[1]:
-            found = self._seek(query, max(k, LISTED))
-        elif seen < n:
-            found = found.copy().extend(keys, seen)
-        self._last = key, found, n
-        return found.rows[0, : min(k, n)]
-
-    def _seek(self, query: Array, k: int) -> Found:
-        keys, n = self.keys.rows, len(self.keys)
-        if n - self._n_in_tree > max(self._NEWEST, self._n_in_tree // 32):
-            # The two options do not change results; while they are off, the tree is built twice as fast.
-            self._tree, self._n_in_tree = cKDTree(keys, balanced_tree=False, compact_nodes=False), n
-        if self._tree is None:
-            return Found.none(query[None], k).extend(keys)
-        n_proposed = min(k + _SPARE, self._tree.n)
-        distances, proposed = self._tree.query(query, n_proposed)
-        beyond = distances[-1] if n_proposed < self._tree.n else np.inf  # least distance of the other rows of the tree
-        found = _among(keys, query, k, np.sort(proposed)).extend(keys, self._n_in_tree)
-        reach = math.sqrt(found.squared[0, -1]) * (1 + _ROUNDING)
-        if reach >= beyond:
-            ball = self._tree.query_ball_point(query, reach, return_sorted=True)
-            found = _among(keys, query, k, np.array(ball, dtype=np.int64)).extend(keys, self._n_in_tree)
-        return found
-
-
-class PolicyNeighbours:
-    """Neighbours in many dimensions: exact for up to ``EXACT_UP_TO`` rows; for more rows, nearly all are found.
+class Neighbours:
+    """Neighbours among the rows of a table, its ``keys``: exact for up to ``EXACT_UP_TO`` rows.
 
     If there are more, rows lie in cells around some of the first rows; only the cells nearest to a query are searched.
     """
 
     def __init__(self, keys: Table) -> None:
-        self.keys = keys
-        self._cells: faiss.Index | None = None
-        # Neighbours of each row, found among its first ``_seen`` rows.
-        self._lists, self._seen, self._extending = Found.none(keys.rows[:0], LISTED), np.empty(0, np.int64), Lock()
+        self.keys, self._changing = keys, RLock()
+        self._width = next((width for width in _FAST if width >= keys.dim), keys.dim)
+        self._index: Any = faiss.IndexFlatL2(self._width)
+        # For each row the list of its nearest rows, their squared distances, and the number of rows compared so far.
+        self._rows, self._squared = np.empty((0, LISTED), np.int64), np.empty((0, LISTED))
+        self._compared = np.empty(0, np.int64)
+        self._last = b"", self._rows, self._squared, 0  # last query, its neighbours, and the number of rows compared
 
-    def nearest(self, queries: Array, k: int, within: float = np.inf) -> Rows:
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Neighbours, (self.keys,)
+
+    def nearest(self, queries: Array, k: int, within: float = math.inf) -> Rows:
         """For each of ``queries`` ``(m, dim)`` the ``(min(k, n),)`` nearest rows, nearest first; -1 instead of rows
         farther than ``within``.
 
         Raises:
             ValueError: ``k`` is below 1.
         """
-        _check_k(k)
-        keys = self.keys.rows
-        if len(keys) <= EXACT_UP_TO:
-            return Found.none(queries, min(k, len(keys))).extend(keys).within(within)
-        return np.concatenate([found.within(within) for found in self._from_cells(queries, k)])
+        rows, squared = self._search(queries, k)
+        return np.where(squared <= within * within, rows, -1)
 
-    def around(self, rows: Rows, k: int, within: float = np.inf) -> Rows:
-        """Result of `nearest` for each of ``rows``; neighbours that are known from earlier calls are not sought again.
+    def nearest_to(self, query: Array, k: int) -> Rows:
+        """Result of `nearest` for one ``query`` ``(dim,)``; asked again, only newer rows are compared.
+
+        Raises:
+            ValueError: ``k`` is below 1.
+        """
+        n, (asked, rows, squared, compared), key = len(self.keys), self._last, query.tobytes()
+        if asked != key or rows.shape[1] < min(n, max(k, LISTED)) or not 1 <= k <= n <= EXACT_UP_TO:
+            rows, squared = self._search(query[None], max(k, LISTED) if k > 0 else k)
+        elif compared < n:
+            rows, squared = rows.copy(), squared.copy()
+            _scan().extend(self.keys.rows, query[None], np.array([compared]), np.zeros(1, np.int64), rows, squared)
+        self._last = key, rows, squared, n
+        return rows[0, :k]
+
+    def around(self, rows: Rows, k: int, within: float = math.inf) -> Rows:
+        """Result of `nearest` for each of ``rows``, from lists that are kept: only newer rows are compared.
 
         Raises:
             ValueError: ``k`` is below 1.
         """
         keys, n = self.keys.rows, len(self.keys)
-        if k > LISTED or n > EXACT_UP_TO:
+        if not 1 <= k <= LISTED <= n <= EXACT_UP_TO:
             return self.nearest(keys[rows], k, within)
-        _check_k(k)
-        with self._extending:
-            lists = self._lists
-            if n > len(self._seen):
-                more = Found.none(keys, LISTED)
-                self._seen = np.concatenate((self._seen, np.zeros(n, np.int64)))
-                found, squared = (np.concatenate(both) for both in zip(lists[1:], more[1:], strict=True))
-                self._lists = lists = Found(lists.queries, found, squared)
-            compiled("sgimd_torch.memory.scan").scan_around(keys, rows, self._seen, lists.rows, lists.squared)
-            return np.ascontiguousarray(lists.within(within, rows)[:, : min(k, n)])
+        with self._changing:
+            if n > len(self._compared):
+                old, size = (self._rows, self._squared, self._compared), 2 * n
+                self._rows, self._squared = np.empty((size, LISTED), np.int64), np.empty((size, LISTED))
+                self._compared = np.zeros(size, np.int64)
+                for new, kept in zip((self._rows, self._squared, self._compared), old, strict=True):
+                    new[: len(kept)] = kept
+            new = rows[self._compared[rows] == 0]
+            if len(new):
+                self._rows[new], self._squared[new] = self._search(keys[new], LISTED)
+                self._compared[new] = n
+            _scan().extend(keys, keys[rows], self._compared[rows], rows, self._rows, self._squared)
+            self._compared[rows] = n
+            return np.where(self._squared[rows, :k] <= within * within, self._rows[rows, :k], -1)
 
-    def _from_cells(self, queries: Array, k: int) -> Iterator[Found]:
-        """The rows nearest to each query in the cells nearest to it."""
-        keys = self.keys.rows
-        if self._cells is None:
-            self._cells = _in_cells(_float32(keys[:EXACT_UP_TO]))
-        if self._cells.ntotal < len(keys):
-            self._cells.add(_float32(keys[self._cells.ntotal :]))
-        _, proposed = self._cells.search(_float32(queries), k + _SPARE)
-        for query, rows in zip(queries, np.sort(proposed, axis=1), strict=True):
-            rows = rows[rows >= 0]
-            if len(rows) < k:  # the cells are nearly empty, or the query overflows float32
-                yield Found.none(query[None], k).extend(keys)
-            else:
-                yield _among(keys, query, k, rows)
+    def _search(self, queries: Array, k: int) -> tuple[Rows, Array]:
+        """The ``(m, min(k, n))`` nearest rows of each query, nearest first, and their squared distances."""
+        if k < 1:
+            raise ValueError(f"k must be at least 1, got {k}")
+        self._add_new_rows()
+        keys, n = self.keys.rows, len(self.keys)
+        if n == 0:
+            return np.empty((len(queries), 0), np.int64), np.empty((len(queries), 0))
+        points = self._single(queries)
+        if n > EXACT_UP_TO:
+            lists = [
+                self._search_cells(*question, k) for question in zip(queries[:, None], points[:, None], strict=True)
+            ]
+            rows, squared = map(np.concatenate, zip(*lists, strict=True))
+            return rows, squared
+        distances = np.empty((len(queries), n), np.float32)
+        vectors = self._index.get_xb()
+        for point, row in zip(points, distances, strict=True):
+            pointers = faiss.swig_ptr(row), faiss.swig_ptr(point), vectors
+            faiss.fvec_L2sqr_ny(*pointers, self._width, n)  # type: ignore[attr-defined]
+        return _scan().nearest(keys, queries, points, distances, min(k, n))
 
+    def _search_cells(self, query: Array, point: Single, k: int) -> tuple[Rows, Array]:
+        """Result of `_search` for one query, among the rows that the index of cells proposes."""
+        _, (proposed,) = self._index.search(point, k + _SPARE)
+        proposed.sort()
+        if proposed[0] < 0:  # the cells are nearly empty
+            proposed = np.arange(len(self.keys))
+        distances = np.zeros((1, len(proposed)), np.float32)  # nothing is ruled out
+        places, squared = _scan().nearest(self.keys.rows[proposed], query, point, distances, k)
+        return proposed[places], squared
 
-class Found(NamedTuple):
-    """Rows nearest to some queries among the rows seen so far, nearest first.
+    def _add_new_rows(self) -> None:
+        """Add new rows to the index; above ``EXACT_UP_TO``, to an index of cells."""
+        n = len(self.keys)
+        if self._index.ntotal == n:
+            return
+        with self._changing:
+            if self._index.ntotal <= EXACT_UP_TO < n:
+                self._index = _cells(self._single(self.keys.rows[:EXACT_UP_TO]), self.keys.dim)
+            if self._index.ntotal < n:
+                self._index.add(self._single(self.keys.rows[self._index.ntotal :]))
 
-    Attributes:
-        queries: ``(m, dim)``.
-        rows: ``(m, k)``; -1 while fewer than k rows were seen.
-        squared: ``(m, k)``, their squared distances; infinite while fewer than k rows were seen.
-    """
-
-    queries: Array
-    rows: Rows
-    squared: Array
-
-    @classmethod
-    def none(cls, queries: Array, k: int) -> Self:
-        """Lists of k rows, before any row was seen."""
-        return cls(queries, np.full((len(queries), k), -1), np.full((len(queries), k), np.inf))
-
-    def copy(self) -> Found:
-        """A copy that `extend` changes alone."""
-        return Found(self.queries, self.rows.copy(), self.squared.copy())
-
-    def extend(self, keys: Array, first: int = 0) -> Found:
-        """Add the rows of ``keys`` ``(n, dim)`` from row ``first`` on."""
-        compiled("sgimd_torch.memory.scan").scan(keys, first, self.queries, self.rows, self.squared)
-        return self
-
-    def within(self, radius: float, queries: Rows | slice = slice(None)) -> Rows:
-        """``rows`` of these queries, as a copy, with -1 instead of those farther than ``radius``."""
-        return np.where(self.squared[queries] <= radius * radius, self.rows[queries], -1)
-
-
-def _among(keys: Array, query: Array, k: int, proposed: Rows) -> Found:
-    """The rows nearest to a query among the increasing rows ``proposed``."""
-    found = Found.none(query[None], k).extend(keys[proposed])
-    n = min(k, len(proposed))
-    found.rows[0, :n] = proposed[found.rows[0, :n]]
-    return found
+    def _single(self, points: Array) -> Single:
+        """``points`` ``(n, dim)`` relative to the first row, in single precision; far points are moved nearer."""
+        single = np.zeros((len(points), self._width), np.float32)
+        single[:, : self.keys.dim] = np.minimum(np.maximum(points - self.keys.rows[:1], -_MOST), _MOST)
+        return single
 
 
-def _in_cells(rows32: NDArray[np.float32]) -> faiss.IndexIVFFlat:
-    """An empty index whose cells lie around some of these rows ``(n, dim)``."""
-    n_cells = 4 * math.isqrt(len(rows32))
-    centres = faiss.IndexFlatL2(rows32.shape[1])
-    centres.add(rows32[:: len(rows32) // n_cells][:n_cells])
-    index = faiss.IndexIVFFlat(centres, rows32.shape[1], n_cells)
+def _scan() -> Any:
+    return compiled("sgimd_torch.memory.scan")
+
+
+def _cells(points: Single, dim: int) -> faiss.IndexIVFFlat:
+    """An empty index whose cells lie around some of these ``points``, which have ``dim`` dimensions."""
+    n_cells = 4 * math.isqrt(len(points))
+    centres = faiss.IndexFlatL2(points.shape[1])
+    centres.add(points[:: len(points) // n_cells][:n_cells])
+    index = faiss.IndexIVFFlat(centres, points.shape[1], n_cells)
     index.is_trained = True  # centres are given, so nothing is left to learn
-    index.nprobe = 16  # number of cells that are searched for a query
+    index.nprobe = min(16, 2 ** (dim - 1) + 1)  # cells searched for a query: in more dimensions more cells are adjacent
     return index
-
-
-def _check_k(k: int) -> None:
-    if k < 1:
-        raise ValueError(f"k must be at least 1, got {k}")
-
-
-def _float32(array: Array) -> NDArray[np.float32]:
-    """The ``array`` as float32; values that are too large become infinite.
-
-    ``np.errstate`` would be unsafe here, because it sets a context variable. In Python 3.11 the garbage collector may
-    run meanwhile and end the attempt of a dropped learner, which queries a memory, too. If the variable is set twice at
-    once, the program crashes.
-    """
-    large = np.abs(array) > _LARGEST32
-    return np.where(large, np.copysign(np.inf, array), array).astype(np.float32)

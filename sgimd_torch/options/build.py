@@ -72,7 +72,7 @@ def build(config: Config) -> RunParts:
     """
     task = task_of(config)
     robot, readers = task.environment, dict[str, Callable[..., Any]](benchmark=benchmark_of)
-    config = config.with_found(robot.found if isinstance(robot, FromFiles) else {})
+    config = config.with_found(robot.found_options if isinstance(robot, FromFiles) else {})
     check_at_once(robot, config.at_once)
     own = [config.constructor("teacher")] if config.teaching == "teacher" else []
     asked = {word: load_word("teachers", word) for word in config.asked}
@@ -94,11 +94,11 @@ def build(config: Config) -> RunParts:
     if config.teaching:
         from sgimd_torch.runs.tasks.taught import correspondence_of
 
-        shown, given["correspondence"] = contents.get("demonstrations", ()), correspondence_of(task)
+        demonstrations, given["correspondence"] = contents.get("demonstrations", ()), correspondence_of(task)
         for make in own:
-            teacher = Teacher.of(make, shown, stream(config.seed, "teacher"))
+            teacher = Teacher.of(make, demonstrations, stream(config.seed, "teacher"))
         for word, make in asked.items():
-            teachers[word] = Demonstrator.of(make, shown, stream(config.seed, f"teacher {word}"))
+            teachers[word] = Demonstrator.of(make, demonstrations, stream(config.seed, f"teacher {word}"))
         given |= {"teachers": teachers} if teachers else {}
     algorithm = f"algorithm {config.algorithm}"
     learner = call_checked(algorithm, config.constructor("algorithm"), robot, config.seed, **given)

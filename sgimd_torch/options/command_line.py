@@ -13,7 +13,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from sgimd_torch.options.config import FLAGS, Config, dashed
+from sgimd_torch.options.config import Config
 from sgimd_torch.options.help import help_on, overview
 from sgimd_torch.runs.signals import Stopping, loading
 
@@ -21,21 +21,21 @@ from sgimd_torch.runs.signals import Stopping, loading
 def main(argv: Sequence[str] | None = None) -> int:
     """The command ``sgimd run``; returns 0 when the run has finished, or raises the errors of ``run_one``."""
     argv = sys.argv[1:] if argv is None else argv
-    config, flags = parse(argv, __doc__)
+    config, resume = parse(argv, __doc__)
     program = ["sgimd"] if Path(sys.argv[0]).name == "sgimd" else [sys.executable, "-m", "sgimd_torch"]
-    again = [*program, "run", *argv, *([] if flags["resume"] else ["--resume"])]
+    again = [*program, "run", *argv, *([] if resume else ["--resume"])]
     with loading():
         from sgimd_torch.options.build import build  # imported here so that --help is fast
         from sgimd_torch.runs.directory import with_found_earlier
         from sgimd_torch.runs.run import run_one
     parts = build(with_found_earlier(config))
     with Stopping() as stopping:
-        print(run_one(parts, stopping, **flags, again=shlex.join(again)))
+        print(run_one(parts, stopping, resume=resume, again=shlex.join(again)))
     return 0
 
 
-def parse(argv: Sequence[str], description: str | None = None) -> tuple[Config, dict[str, bool]]:
-    """The run that a command line describes, and its flags.
+def parse(argv: Sequence[str], description: str | None = None) -> tuple[Config, bool]:
+    """The run that a command line describes, and whether to resume it.
 
     Raises:
         ValueError: a word belongs to no option, or a value is wrong.
@@ -46,7 +46,7 @@ def parse(argv: Sequence[str], description: str | None = None) -> tuple[Config, 
         if "help" in flags:
             print(help_on(texts) if texts else overview(description))
             raise SystemExit(0)
-        return Config.from_settings(texts), {flag: flag in flags for flag in FLAGS}
+        return Config.from_settings(texts), "resume" in flags
     except ValueError as error:
         raise ValueError(f"{error}\n--help explains all options") from error
 
@@ -61,15 +61,13 @@ def _read(argv: Sequence[str]) -> tuple[dict[str, str], set[str]]:
     while waiting:
         word, equals, text = waiting.pop(0).partition("=")
         name = word.removeprefix("--").replace("-", "_")
-        if word in ("-h", "--help"):
-            flags.add("help")
+        if word in ("-h", "--help", "--resume") and not equals:
+            flags.add("resume" if word == "--resume" else "help")
         elif not word.startswith("--"):
-            known = f", a flag such as --{dashed(next(iter(FLAGS)))} none"
-            raise ValueError(f"{word!r} belongs to no option; an option begins with -- and takes one value{known}")
-        elif name in FLAGS and equals:
+            what = "an option begins with -- and takes one value, a flag such as --resume none"
+            raise ValueError(f"{word!r} belongs to no option; {what}")
+        elif word in ("--help", "--resume"):
             raise ValueError(f"{word} takes no value, got {text!r}")
-        elif name in FLAGS:
-            flags.add(name)
         elif equals:
             texts[name] = text
         elif waiting and not waiting[0].startswith("--"):

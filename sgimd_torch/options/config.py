@@ -153,10 +153,10 @@ class Config:
         }
         return partial(part.make, **keywords)
 
-    def with_found(self, found: Mapping[str, Any]) -> Self:
-        """These settings, with options that the robot ``found`` by movements, such as the corners of T."""
-        options = {f"environment.{name}": value for name, value in found.items() if f"environment.{name}" in self}
-        return replace(self, parts={**dict(self.parts), **options})
+    def with_found(self, options: Mapping[str, Any]) -> Self:
+        """These settings, with options that the robot has found by movements, such as the corners of T."""
+        parts = {f"environment.{name}": value for name, value in options.items()}
+        return replace(self, parts={**dict(self.parts), **{name: parts[name] for name in parts if name in self}})
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -223,7 +223,7 @@ class Config:
         if name.partition(".")[0] in OF_TEACHING and not self.teaching:
             why = f"learns alone; taught are {', '.join(TAUGHT_BY)}"
         else:
-            known = sorted({*self.defaults, *FLAGS} - {name})
+            known = sorted(self.defaults.keys() - {name})
             near = did_you_mean(name, [option for option in known if option.rpartition(".")[0] == owner], 2)
             why = f"has no such option{dashed(near)}"
         return ValueError(f"--{dashed(name)}: {part.kind} {part.word} {why}")
@@ -231,9 +231,6 @@ class Config:
 
 RUN: Final = options_of(Config)
 """Options of every run."""
-FLAGS: Final = {
-    "resume": "flag: go on with a stopped or killed run, or lengthen a finished one.",
-}
 
 
 class Part(NamedTuple):
@@ -280,12 +277,17 @@ def chosen(given: Mapping[str, Any]) -> dict[str, Part]:
         make = default if callable(default) and word == usual else load_word(kind, word)
         fixed = make.keywords if isinstance(make, partial) and make is not default else {}  # those that the word fixes
         prefix = "" if name == "algorithm" else f"{name}."
-        options = {prefix + keyword: option for keyword, option in options_of(make).items() if keyword not in fixed}
-        options = {option: each for option, each in options.items() if option not in RUN}  # the run's own go first
-        choices = {option: each for option, each in options.items() if each.kind in WORDS}
-        words = {option: Option(each.kind, word_of(each.kind, each.default)) for option, each in choices.items()}
-        parts[name] = Part(kind, word, make, {**options, **words})
-        waiting[:0] = choices.items()
+        options, choices = {}, []
+        for keyword, option in options_of(make).items():
+            own = prefix + keyword
+            if keyword in fixed or own in RUN:  # an option of the run hides an option of the algorithm
+                continue
+            options[own] = option
+            if option.kind in WORDS:
+                options[own] = Option(option.kind, word_of(option.kind, option.default))
+                choices.append((own, option))
+        parts[name] = Part(kind, word, make, options)
+        waiting[:0] = choices
     return parts
 
 

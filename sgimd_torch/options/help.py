@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from sgimd_torch.options.catalogue import WORDS, about
-from sgimd_torch.options.config import FLAGS, RUN, Config, chosen, dashed
+from sgimd_torch.options.config import RUN, Config, chosen, dashed
 from sgimd_torch.options.signature import Option, as_text, help_of, name_of
 
 _CHOOSE: Final = {"progress": "goals.progress", "choose": "teacher.choose"}  # options that choose parts of other parts
@@ -26,7 +26,7 @@ def overview(description: str | None) -> str:
         "",
         "options of every run:",
         *_described(RUN, Config),
-        *(_line(f"--{dashed(flag)}", text) for flag, text in FLAGS.items()),
+        _line("--resume", "flag: go on with a stopped or killed run, or lengthen a finished one"),
         "names for --algorithm:",
         *(_line(word, about("algorithm", word)) for word in own),
         _line("for comparison", f"{', '.join(rivals)}; these need the extra rivals"),

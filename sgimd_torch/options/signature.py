@@ -54,15 +54,15 @@ def options_of(make: Callable[..., Any]) -> dict[str, Option]:
     A keyword called like a kind of the catalogue, with a constructor for a default, chooses a part. Simple types are
     number, text, bool, path, tuple of these, or None.
     """
-    parameters = {name: each for name, each in parameters_of(make).items() if each.default is not _EMPTY}
-    kinds = {name: _kind(each) for name, each in parameters.items()}
-    return {name: Option(kind, parameters[name].default) for name, kind in kinds.items() if kind is not None}
+    options = {name: Option(_kind(parameter), parameter.default) for name, parameter in parameters_of(make).items()}
+    return {name: option for name, option in options.items() if option.kind and option.default is not _EMPTY}
 
 
 def parameters_of(make: Callable[..., Any]) -> dict[str, inspect.Parameter]:
     """Parameters of ``make`` that can be given by name."""
     by_name = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY)
-    return {each.name: each for each in inspect.signature(make).parameters.values() if each.kind in by_name}
+    parameters = inspect.signature(make).parameters
+    return {name: parameter for name, parameter in parameters.items() if parameter.kind in by_name}
 
 
 def help_of(make: Callable[..., Any]) -> dict[str, str]:

@@ -6,8 +6,8 @@
 `layout` has the tables, and ``docs/runs.md`` explains each column: settings and other facts (``about``), everything
 that happened (``events``), each demonstration once, and tables that a replay fills again (``DERIVED``).
 
-Every row ends in a checksum of itself, its number and its table, and the table ``about`` has the number of rows of each
-table. So reading raises an error if a row was changed, lost, doubled or moved.
+Every row ends in a checksum of itself and its number, and ``about`` has the number of rows of each table. So
+reading raises an error if a row was changed, lost, doubled or moved.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ class Record:
                 connection.execute("BEGIN IMMEDIATE")
                 for statement in _tables(dims).values():
                     connection.execute(statement)
-                rows = _with_checksums("about", 0, _about_rows({"dims": dims, **about}, n_rows))
+                rows = _with_checksums(_about_rows({"dims": dims, **about}, n_rows))
                 connection.executemany("INSERT INTO about VALUES (?, ?, ?)", rows)
         except sqlite3.Error as error:
             raise OSError(f"{path} cannot be written: {error}") from error
@@ -126,7 +126,7 @@ class Record:
             while rows := self._connection.execute(next_rows, (number,)).fetchall():
                 for rowid, *row, checksum in rows:
                     number += 1
-                    if rowid != number or checksum != _checksum(table, number, row):
+                    if rowid != number or checksum != _checksum(number, row):
                         raise RunError(f"row {number} of {table} is not what was written; {HINT}")
                     yield tuple(row)
             if number != self._n_rows.get(table, number):
@@ -200,7 +200,7 @@ class Record:
 
     def _append(self, table: str, rows: Sequence[Row]) -> None:
         if rows:
-            complete = _with_checksums(table, self._n_rows[table], rows)
+            complete = _with_checksums(rows, self._n_rows[table])
             marks = ", ".join("?" * len(complete[0]))
             with self._translated_errors(writing=True):
                 self._connection.executemany(f"INSERT INTO {table} VALUES ({marks})", complete)
@@ -293,10 +293,10 @@ def _as_bytes(row: Sequence[Any]) -> bytes:
     return marshal.dumps(tuple(row), 2)
 
 
-def _checksum(table: str, number: int, row: Sequence[Any]) -> int:
-    """The checksum of a row, which has this ``number`` in its ``table``, from 1."""
-    return zlib.crc32(_as_bytes((table, number, *row)))
+def _checksum(number: int, row: Sequence[Any]) -> int:
+    """The checksum of a row, which has this ``number`` in its table, from 1."""
+    return zlib.crc32(_as_bytes((number, *row)))
 
 
-def _with_checksums(table: str, n_before: int, rows: Iterable[Row]) -> list[Row]:
-    return [(*row, _checksum(table, number, row)) for number, row in enumerate(rows, n_before + 1)]
+def _with_checksums(rows: Iterable[Row], n_before: int = 0) -> list[Row]:
+    return [(*row, _checksum(number, row)) for number, row in enumerate(rows, n_before + 1)]

@@ -12,7 +12,7 @@ from sgimd_torch.learner.events import Event, Kind
 from sgimd_torch.spaces import Array, Demonstration
 
 DERIVED: Final = ("goals", "evaluations", "errors", "regions", "predictions", "refreshes")  # tables that a replay fills
-HINT: Final = "was it damaged or edited? sqlite3 run.sqlite .recover saves what can be read"  # end of error messages
+HINT: Final = "was it damaged or edited? sqlite3 run.sqlite .recover prints what can be read"  # end of error messages
 
 Dims = tuple[int, int, int]
 """Dimensions of context, theta and outcome."""

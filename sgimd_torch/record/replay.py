@@ -54,7 +54,7 @@ def replay(
     before: dict[int, BeforeMovement] = {}
     for group in _together(events):
         event, index = group[0], learner.movements
-        last, caused = index + group[-1].place, before.get(event.place, BeforeMovement())
+        last, preceding = index + group[-1].place, before.get(event.place, BeforeMovement())
         # Between two runs the caller may show something, or begin or end an attempt; then no teacher is asked.
         between = event.place < 0 or (event.kind in _ALONE and event.who is None)
         if teacher is not None and not between:
@@ -72,13 +72,13 @@ def replay(
                     raise ReplayError(f"{refused}; is it built in the same way and with the same seed?") from error
                 if not between:
                     offered.pop(last, None)
-                    before[event.place] = caused._replace(demonstration=event.lesson)
+                    before[event.place] = preceding._replace(demonstration=event.lesson)
             case Kind.ASKED:
                 assert event.context is not None
                 learner.request(event.context, place=event.place)
                 if event.who is not None and event.goal is not None:
                     request = Request(event.who, event.goal, event.strategy or "")
-                    before[event.place] = caused._replace(request=request, reply=event.reply or "")
+                    before[event.place] = preceding._replace(request=request, reply=event.reply or "")
                     if event.reply != "shown":
                         learner.go_on_alone(event.reply or "", place=event.place)
             case Kind.ADDED:
@@ -115,8 +115,8 @@ def replay(
                     context, failed = event.context, event.reply or "" if _failed(event) else ""
                     if context is None or _unseen(event):
                         context = np.full(learner.memory.context_dim, np.nan)
-                    caused = before.pop(event.place, BeforeMovement())
-                    yield Episode(index + event.place, context, moves[event.place], event.outcome, *caused, failed)
+                    preceding = before.pop(event.place, BeforeMovement())
+                    yield Episode(index + event.place, context, moves[event.place], event.outcome, *preceding, failed)
     return before
 
 

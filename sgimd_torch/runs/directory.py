@@ -90,7 +90,9 @@ def holds_run(path: Path) -> bool:
 
 def with_found_earlier(config: Config) -> Config:
     """The settings, with what the robot found by movements when this run began, if the run is on disk."""
-    names = {f"environment.{name}" for name in getattr(function_of(config.chosen["environment"].make), "FOUND", ())}
+    names = {
+        f"environment.{name}" for name in getattr(function_of(config.chosen["environment"].make), "FOUND_OPTIONS", ())
+    }
     if not names or not holds_run(config.directory / FILE):
         return config
     with Record(config.directory / FILE) as record:

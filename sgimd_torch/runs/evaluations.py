@@ -35,7 +35,7 @@ class Evaluations:
     """All evaluations of a run, by the number of movements before each one.
 
     Args:
-        parts: parts of the run; their ``answers`` are evaluated.
+        parts: parts of the run; their ``inverses`` are evaluated.
         record: record of the run; movements of an evaluation are not recorded.
         between: function to call between movements of an evaluation; it may raise `KeyboardInterrupt`.
     """
@@ -73,21 +73,17 @@ class Evaluations:
 
         At each goal the noise is the same for all inverse models. The noise floor is measured for the run's own model.
         """
-        inverses, repeats = self.parts.inverses, self._repeats(movements)
-        own, *others = inverses
-        parts = self.parts
-        judged: tuple[Any, ...] = parts.environment, parts.benchmark.goals, parts.config.seed, movements
-        how: dict[str, Any] = {"between": self.between}
-        evaluations = {own: evaluate(inverses[own], *judged, repeats=repeats, **how)}
-        for word in others:
-            same = inverses[word] is inverses[own]
-            again = evaluations[own].without_noise if same else evaluate(inverses[word], *judged, repeats=0, **how)
-            evaluations[word] = again
+        parts, config = self.parts, self.parts.config
+        where = parts.environment, parts.benchmark.goals, config.seed, movements
+        repeats = config.repeats if config.due(movements, config.floors) else 0
+        own = evaluate(parts.inverses[OWN], *where, repeats=repeats, between=self.between)
+        evaluations = {OWN: own}
+        for name, inverse in parts.inverses.items():
+            if inverse is parts.inverses[OWN]:
+                evaluations.setdefault(name, own.without_noise)
+            else:
+                evaluations[name] = evaluate(inverse, *where, repeats=0, between=self.between)
         return evaluations
-
-    def _repeats(self, movements: int) -> int:
-        config = self.parts.config
-        return config.repeats if config.due(movements, config.floors) else 0
 
     def _write(self, movements: int, evaluations: ByInverse) -> None:
         """Add evaluations to the record, and the current regions of the goal model."""
@@ -96,16 +92,9 @@ class Evaluations:
             quantiles = np.median(errors), np.quantile(errors, 0.9)
             summary = evaluation.mean_error, *quantiles, evaluation.noise_floor, evaluation.expected.mean(), met
             self.record.add_rows("evaluations", [(movements, word, *summary)])
-            columns = (
-                errors,
-                evaluation.scatter,
-                evaluation.failed.astype(int),
-                evaluation.expected,
-                evaluation.contexts,
-            )
-            numbered = enumerate(zip(*columns, strict=True))
-            rows = [(movements, word, goal, *numbers, *context) for goal, (*numbers, context) in numbered]
-            self.record.add_rows("errors", rows)
+            columns = errors, evaluation.scatter, evaluation.failed.astype(int), evaluation.expected
+            rows = zip(range(len(errors)), *columns, evaluation.contexts, strict=True)
+            self.record.add_rows("errors", [(movements, word, *numbers, *context) for *numbers, context in rows])
         self.record.add_rows("regions", [(movements, *_fields(region)) for region in self.parts.learner.regions])
 
 

@@ -31,7 +31,6 @@ def sweep(
     configs: Sequence[Config],
     processes: int,
     *,
-    flags: Sequence[str] = (),
     on_end: Callable[[Config], None] | None = None,
 ) -> list[str]:
     """Carry out runs in this order and show progress; a failed run does not stop the others.
@@ -39,7 +38,6 @@ def sweep(
     Args:
         configs: the runs, each with its own directory; they are started or resumed.
         processes: number of runs at a time.
-        flags: flags of ``sgimd run`` for all runs, besides --resume.
         on_end: function to call with each run that ended well; its ValueError or OSError means failure.
 
     Returns:
@@ -62,7 +60,7 @@ def sweep(
             while (waiting or running) and not stopping.heard:
                 while waiting and len(running) < processes:
                     config = waiting.pop()
-                    running[config] = _start(config, flags)
+                    running[config] = _start(config)
                 ended = _wait(running, stopping)
                 done |= {config: _on_disk(config) for config in running}
                 for config in ended:
@@ -84,10 +82,10 @@ def sweep(
     return [failures[config] for config in configs if config in failures]
 
 
-def _start(config: Config, flags: Sequence[str]) -> tuple[Process, int]:
+def _start(config: Config) -> tuple[Process, int]:
     """The process of a run, and the length of its log before."""
     make_folder(config.directory.parent)
-    command = [sys.executable, "-m", "sgimd_torch", "run", "--resume", *flags, *words(config)]
+    command = [sys.executable, "-m", "sgimd_torch", "run", "--resume", *words(config)]
     with log_of(config).open("ab") as log:
         before = log.tell()
         # The run has its own process group: Ctrl-C reaches only this process, which passes it on.

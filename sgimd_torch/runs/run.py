@@ -26,7 +26,7 @@ from sgimd_torch.runs.signals import Failed, Progress, Stopped, Stopping, say
 from sgimd_torch.session import NoOutcomeError, reason_of, run
 from sgimd_torch.spaces import Episode
 
-TOLD: Final = 3  # first failures, with a message each; later ones are only counted
+N_TOLD: Final = 3  # number of failures with a message each; later ones are only counted
 COMMIT_EVERY: Final = 1.0  # s between two commits; a killed run loses the movements since the last commit
 
 
@@ -220,8 +220,8 @@ class RunLoop:
         self.movements = episode.index + 1
         if episode.failed:
             self.failed += 1
-            if not replayed and self.failed <= TOLD:
-                more = "; further failures are only counted" if self.failed == TOLD else ""
+            if not replayed and self.failed <= N_TOLD:
+                more = "; further failures are only counted" if self.failed == N_TOLD else ""
                 say(f"movement {episode.index} failed: {episode.failed}{more}")
         for listener in self.listeners:
             listener.episode(episode, replayed)

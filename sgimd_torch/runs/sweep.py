@@ -56,18 +56,17 @@ def parser() -> argparse.ArgumentParser:
 def main(argv: Sequence[str] | None = None) -> int:
     """Carry out all unfinished runs; return the exit code, which is 1 if runs failed."""
     options, rest = parser().parse_known_args(argv)
-    variants, flags = variants_of(options.vary, rest)
+    variants = variants_of(options.vary, rest)
     configs = [replace(variant, seed=seed) for seed in options.seeds for variant in variants]
-    return run_all(configs, options, flags, variants[0].out)
+    return run_all(configs, options, variants[0].out)
 
 
-def run_all(whole: Sequence[Config], options: argparse.Namespace, flags: Sequence[str], out: Path) -> int:
+def run_all(whole: Sequence[Config], options: argparse.Namespace, out: Path) -> int:
     """Carry out the unfinished runs of a study, or list them; return the exit code, which is 1 if runs failed.
 
     Args:
         whole: all runs of the study.
         options: parsed options of ``add_options``.
-        flags: flags of ``sgimd run`` for all runs, besides --resume.
         out: folder of the study.
 
     Raises:
@@ -86,7 +85,7 @@ def run_all(whole: Sequence[Config], options: argparse.Namespace, flags: Sequenc
     for config in {config.directory.parent: config for config in left}.values():
         build(config)  # wrong options raise an error before any run starts
     make_folder(out)
-    failures = sweep(left, options.processes, flags=flags)
+    failures = sweep(left, options.processes)
     say(f"{len(left) - len(failures)} runs ended well, {len(failures)} failed: {out}", *failures)
     return 1 if failures else 0
 
@@ -143,8 +142,8 @@ class Shard(NamedTuple):
         return f", shard {self.k}/{self.n} of {len(whole)} runs" if self.n > 1 else ""
 
 
-def variants_of(varied: Sequence[str], options: Sequence[str]) -> tuple[list[Config], list[str]]:
-    """A run for every combination of varied values, named after them, and the flags among ``options``.
+def variants_of(varied: Sequence[str], options: Sequence[str]) -> list[Config]:
+    """A run for every combination of varied values, named after them.
 
     Args:
         varied: values of --vary, such as ``["goals=interest-map,uniform", "budget=5,15"]``.
@@ -170,10 +169,10 @@ def variants_of(varied: Sequence[str], options: Sequence[str]) -> tuple[list[Con
     variants = []
     for combination in itertools.product(*values.values()):
         chosen = dict(zip(values, combination, strict=True))
-        config, flags = parse([*options, *(f"--{option}={value}" for option, value in chosen.items())])
+        config, _ = parse([*options, *(f"--{option}={value}" for option, value in chosen.items())])
         in_order = sorted(chosen, key=lambda option: (option != "algorithm", option))
         variants.append(replace(config, name=",".join(_in_name(option, chosen[option]) for option in in_order) or None))
-    return variants, [f"--{dashed(flag)}" for flag, on in flags.items() if on]
+    return variants
 
 
 def _in_name(option: str, value: str) -> str:

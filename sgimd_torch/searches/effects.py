@@ -4,7 +4,7 @@ Our addition. A movement that misses an object does not move it. So all movement
 depend on the context alone: these outcomes lie on the *plateau*, an affine map of the context. RANSAC (Fischler &
 Bolles 1981) finds the plateau: of many affine maps of the context, each through a few random exemplars, it takes the
 one that fits most other exemplars.
-    effects = Effects(memory, problem.outcome_noise); acted = effects()
+    effects = Effects(memory, problem.outcome_noise); effective = effects()
 """
 
 from __future__ import annotations
@@ -54,14 +54,17 @@ class Effects:
         if self._n_searched < int(size) <= n:
             self._n_searched = int(size)
             self._plateau = self._find_plateau()
-            self._acted, self._seen = Memory(self.memory.context_dim, self.memory.theta_dim, self.memory.outcome_dim), 0
+            self._effective, self._seen = (
+                Memory(self.memory.context_dim, self.memory.theta_dim, self.memory.outcome_dim),
+                0,
+            )
         if self._plateau is None:
             return None
         new = slice(self._seen, n)
         for row in self._seen + np.flatnonzero(self._distances(self._plateau, new) > _WITHIN * self._scale):
-            self._acted.add(self.memory.contexts[row], self.memory.thetas[row], self.memory.outcomes[row])
+            self._effective.add(self.memory.contexts[row], self.memory.thetas[row], self.memory.outcomes[row])
         self._seen = n
-        return self._acted
+        return self._effective
 
     def _find_plateau(self) -> Array | None:
         """The plateau of the first ``_n_searched`` exemplars; None if they have no plateau."""

@@ -130,24 +130,24 @@ class Returning(Explore):
         .1; None if all movements have an effect."""
         if len(self.problem.memory) < self.first:
             return 1.0
-        acted = self.problem.inverse.effects()
-        return None if acted is None else _SHARE if len(acted) >= _ENOUGH else 1.0
+        effective = self.problem.inverse.effects()
+        return None if effective is None else _SHARE if len(effective) >= _ENOUGH else 1.0
 
     def __call__(self, context: Array) -> Array:
         """The next movement ``(theta_dim,)``."""
-        acted, policies = self.problem.inverse.effects(), self.problem.policies
+        effective, policies = self.problem.inverse.effects(), self.problem.policies
         if len(self.problem.memory) < self.first:
             return policies.sample(self.rng)
-        if acted is None:
+        if effective is None:
             return self._widening(context)
         if len(self.problem.memory) > self._seen:  # several robots may move at once
             for theta in self._varied:
-                self.width.update(bool(policies.same(acted.thetas, theta).any()))
+                self.width.update(bool(policies.same(effective.thetas, theta).any()))
             self._varied, self._seen = [], len(self.problem.memory)
-        if not len(acted) or self.rng.random() < _ANYWHERE:
+        if not len(effective) or self.rng.random() < _ANYWHERE:
             return policies.sample(self.rng)
-        order = np.linalg.norm(acted.contexts - context, axis=1).argsort(kind="stable")
-        theta = acted.thetas[self.rng.choice(order[:_SIMILAR] if acted.context_dim else order)]
+        order = np.linalg.norm(effective.contexts - context, axis=1).argsort(kind="stable")
+        theta = effective.thetas[self.rng.choice(order[:_SIMILAR] if effective.context_dim else order)]
         varied = policies.clip(self.rng.normal(theta, self.width.sd * policies.sides))
         self._varied.append(varied)
         return varied

@@ -19,7 +19,7 @@ import numpy as np
 
 from sgimd_torch.evaluation import RECENT
 from sgimd_torch.runs.signals import printable
-from sgimd_torch.views.statistics import Interval, over_seeds, point, show
+from sgimd_torch.views.statistics import Interval, interval_text, over_seeds
 from sgimd_torch.views.variants import EARLY, Variant, unit_of
 
 MISSING: Final = "-"  # text of a number that is not known
@@ -40,7 +40,7 @@ class Column(NamedTuple):
 
     def texts(self) -> list[str]:
         """Numbers as texts, with their intervals in brackets."""
-        return [MISSING if cell is None else show(cell, self.form) for cell in self.cells]
+        return [MISSING if cell is None else interval_text(cell, self.form) for cell in self.cells]
 
     def parts(self) -> list[list[str]]:
         """Columns, with their heads, of all digits: of the numbers and, if there are any, of the ends of intervals."""
@@ -61,25 +61,25 @@ def results(variants: Sequence[Variant]) -> list[Column]:
         expected = at_last("expected_error")
         early = [variant.at(EARLY) if variant.last > EARLY else None for variant in variants]
         columns = [
-            Column("seeds", [point(len(variant.used)) for variant in variants], ".0f"),
-            Column("movements", [point(variant.last) if variant.last else None for variant in variants], ".0f"),
+            Column("seeds", [Interval(len(variant.used)) for variant in variants], ".0f"),
+            Column("movements", [Interval(variant.last) if variant.last else None for variant in variants], ".0f"),
             *([Column(unit(f"error at {EARLY}"), early)] if any(early) else []),
             Column(unit("error"), at_last("mean_error")),
             *([Column(unit("expected error"), expected)] if any(expected) else []),
             Column(unit("median"), at_last("median_error")),
-            Column(unit("noise floor"), [floor and point(floor.value) for floor in at_last("noise_floor")]),
+            Column(unit("noise floor"), [floor and Interval(floor.value) for floor in at_last("noise_floor")]),
         ]
     else:
         own = [variant.own for variant in variants]
         columns = [
-            Column("seeds", [point(len(variant.runs)) for variant in variants], ".0f"),
-            Column("movements", [point(int(curve.movements[-1])) for curve in own], ".0f"),
+            Column("seeds", [Interval(len(variant.runs)) for variant in variants], ".0f"),
+            Column("movements", [Interval(int(curve.movements[-1])) for curve in own], ".0f"),
             Column("failed", [over_seeds(variant.failed) for variant in variants], ".1%"),
             Column(unit(f"miss of the last {RECENT} own goals"), [curve.last_missed for curve in own]),
             Column("met", [curve.last_met for curve in own], ".0%"),
         ]
     for head, part in (("physics", "physics"), ("learning", "learner")):
-        columns.append(Column(f"{head} (ms)", [point(1e3 * variant.seconds(part)) for variant in variants], ".2f"))
+        columns.append(Column(f"{head} (ms)", [Interval(1e3 * variant.seconds(part)) for variant in variants], ".2f"))
     return columns
 
 

@@ -2,7 +2,7 @@
 
 Agarwal et al. (2021), "Deep reinforcement learning at the edge of the statistical precipice": with few seeds, every
 number needs an interval. ``errors`` are mean benchmark errors (m), one for each seed; smaller is better.
-    number = iqm_interval(errors, rng=rng()); show(number)
+    number = iqm_interval(errors, rng=bootstrap_rng()); interval_text(number)
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from scipy import stats
 
 from sgimd_torch.spaces import Array
 
-LEVEL = 0.95
-RESAMPLES = 9999
+LEVEL: Final = 0.95  # confidence level of an interval
+RESAMPLES: Final = 9999  # number of draws of the bootstrap
 LEAST_SEEDS: Final = 5  # smallest number of seeds for an interval and a verdict
 SEED: Final = 2014  # seed of the bootstrap; each number draws from its own default_rng(SEED)
 
@@ -25,16 +25,16 @@ class Interval(NamedTuple):
     """A statistic and its interval from ``low`` to ``high``, 95 % by default; NaN if there are too few seeds."""
 
     value: float
-    low: float
-    high: float
+    low: float = float("nan")
+    high: float = float("nan")
 
 
-def rng() -> np.random.Generator:
+def bootstrap_rng() -> np.random.Generator:
     """A new random stream for the bootstrap of one number."""
     return np.random.default_rng(SEED)
 
 
-def show(number: Interval, form: str = ".2f", unit: str = "") -> str:
+def interval_text(number: Interval, form: str = ".2f", unit: str = "") -> str:
     """A text such as ``0.48 [0.45, 0.52] m``; without an interval, no brackets. Minus signs are ASCII, for programs."""
     between = "" if np.isnan(number.low) else f" [{number.low:{form}}, {number.high:{form}}]"
     return f"{number.value:{form}}{between}{f' {unit}' if unit else ''}"
@@ -60,7 +60,7 @@ def interval(
 
     The bootstrap is stratified: each sample draws its own seeds, as many as it has. If errors are normal, the interval
     has the true interquartile mean in 94 % of cases with 10 or 20 seeds, and in only 90 % of cases with 5 seeds.
-    If a sample has fewer than ``LEAST_SEEDS`` seeds, the result is a `point`.
+    If a sample has fewer than ``LEAST_SEEDS`` seeds, both ends are NaN.
 
     Args:
         statistic: function of arrays ``(..., n_seeds, *rest)``, one for each sample; it returns ``(...)``.
@@ -82,7 +82,7 @@ def interval(
         raise ValueError(f"pairs need the same seeds, got samples of {[len(sample) for sample in samples]}")
 
     if min(map(len, samples)) < LEAST_SEEDS:
-        return point(float(statistic(*samples)))
+        return Interval(float(statistic(*samples)))
 
     def of_rows(*rows: Array, axis: int) -> Array:
         return statistic(*(sample[row] for sample, row in zip(samples, rows, strict=True)))
@@ -110,16 +110,11 @@ def iqm_interval(*strata: Array, rng: np.random.Generator, level: float = LEVEL)
     return interval(lambda *drawn: interquartile_mean(np.concatenate(drawn, axis=-1)), *strata, rng=rng, level=level)
 
 
-def point(value: float) -> Interval:
-    """A number whose interval is unknown, for too few seeds."""
-    return Interval(value, np.nan, np.nan)
-
-
 def over_seeds(values: Array) -> Interval | None:
     """Interquartile mean of ``(n_seeds,)`` values with its interval; None if a value is missing."""
     if not len(values) or not np.isfinite(values).all():
         return None
-    return point(float(values[0])) if len(values) == 1 else iqm_interval(values, rng=rng())
+    return Interval(float(values[0])) if len(values) == 1 else iqm_interval(values, rng=bootstrap_rng())
 
 
 def common_differences(ours: Mapping[int, float], theirs: Mapping[int, float]) -> Array:

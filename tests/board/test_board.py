@@ -18,7 +18,7 @@ from own import MODULE
 from runs import content_of
 from sgimd_torch import InterestMap, stream
 from sgimd_torch.board import pictures
-from sgimd_torch.board.curves import Behaviour, branches, of_evaluation, of_regions
+from sgimd_torch.board.curves import Behaviour, branches, evaluation_curves, region_curves
 from sgimd_torch.board.legend import LEGEND
 from sgimd_torch.board.listener import EventFile
 from sgimd_torch.evaluation import Evaluation
@@ -117,7 +117,7 @@ def test_requests_are_counted_by_strategy():
 
 def test_a_region_that_was_cut_goes_on_as_the_mean_over_the_goals_of_its_parts():
     regions = interest_map().regions
-    values = of_regions(regions)
+    values = region_curves(regions)
     for path in ("R", "R0", "R10"):
         below = [region for region in regions if region.path.startswith(path)]
         assert len(below) > 1
@@ -129,7 +129,7 @@ def test_a_region_that_was_cut_goes_on_as_the_mean_over_the_goals_of_its_parts()
 
 
 def test_the_share_of_goals_met_is_counted():
-    values = of_evaluation(evaluation([0.01, 0.2, 0.05, 0.0]), 0.05)
+    values = evaluation_curves(evaluation([0.01, 0.2, 0.05, 0.0]), 0.05)
     assert values["goals/met"] == 0.75
     assert (values["error/mean"], values["error/noise_floor"]) == pytest.approx((0.065, 0.01))
 

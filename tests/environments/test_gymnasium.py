@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.environments.check import check_environment
 from sgimd_torch.environments.controllers import Sinusoids
 from sgimd_torch.environments.from_gymnasium import FromGymnasium, measured_noise
@@ -13,7 +12,6 @@ from sgimd_torch.environments.motor_primitives import GaussianPrimitive
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.protocol import SimulationError
 from sgimd_torch.environments.to_gymnasium import ToGymnasium
-from sgimd_torch.session import run
 from sgimd_torch.spaces import Box, stream
 
 PUSHES = Box.cube(-1, 1, 2)
@@ -151,25 +149,6 @@ def test_a_start_that_is_seen_and_not_set_is_a_context(world, noise):
         robot.execute(np.zeros(2), still, stream(0, "any"))
 
 
-def test_the_pendulum_learns_from_starts_that_it_sees():
-    world = gymnasium.make("Pendulum-v1")
-    robot = FromGymnasium(
-        world,
-        GaussianPrimitive(Box(world.action_space.low, world.action_space.high), (1.0, 5.0)),
-        steps=100,
-        outcome=lambda observations: [np.arctan2(*observations[-1][1::-1])],
-        outcomes=Box.cube(-np.pi, np.pi, 1, names=("angle",), unit="rad"),
-        rest=[0.0],
-        outcome_noise=0.0,
-        contexts=Box.cube(-1.01, 1.01, 3),
-        context=lambda first: first / [1, 1, 8],
-    )
-    check_environment(robot)
-    learner = practice(robot, 0)
-    outcomes = [episode.outcome for episode in run(learner, robot, 0, movements=20)]
-    assert np.ptp(outcomes) > 1
-
-
 def test_the_noise_of_resets_is_measured():
     found = measured_noise(sled(), stream(0, "any"), movements=200)
     assert found == pytest.approx(0.1 / np.sqrt(3), rel=0.1)  # the uniform start is the only noise
@@ -189,20 +168,6 @@ def test_an_observation_has_a_number_even_without_contexts():
     last, *_ = world.step(np.full(3, 0.5))
     assert first["observation"].tolist() == last["observation"].tolist() == [0.0]
     assert world.observation_space.contains(first)
-
-
-@pytest.mark.slow
-def test_hindsight_learns_on_a_robot_of_ours():
-    sb3 = pytest.importorskip("stable_baselines3")
-    world = ToGymnasium(PlanarArm(3))
-    settings = {"learning_rate": 1e-3, "ent_coef": 0.01, "seed": 0}
-    learner = sb3.SAC("MultiInputPolicy", world, replay_buffer_class=sb3.HerReplayBuffer, **settings)
-    learner.learn(600)
-    rewards = []
-    for seed in range(40):
-        observation, _ = world.reset(seed=seed)
-        rewards.append(world.step(learner.predict(observation, deterministic=True)[0])[1])
-    assert np.mean(rewards) > -0.4  # it was -.17; random movements have -.93
 
 
 def test_an_episode_of_ours_is_one_movement_whose_reward_is_the_distance_to_the_goal():

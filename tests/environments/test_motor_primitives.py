@@ -1,10 +1,13 @@
-"""Eqs. (5) and (6): trajectories worked out by hand, and theta found again from the trajectory it made."""
+"""Eqs. (5) and (6), and sinusoids: commands worked out by hand, and theta found again from the commands it made."""
+
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from sgimd_torch.environments.controllers import Sinusoids
 from sgimd_torch.environments.motor_primitives import GaussianPrimitive
 from sgimd_torch.spaces import Array, Box, stream
 
@@ -121,29 +124,51 @@ def test_a_demonstration_is_played_at_its_own_pace_or_the_fastest_allowed(durati
     assert found[:-1] == pytest.approx(theta[:-1], abs=1e-6)  # the shape is kept
 
 
-@pytest.mark.parametrize("duration", [1.61, 1400.0])
-def test_a_demonstration_longer_than_the_longest_movement_is_refused(duration: float) -> None:
-    skill = primitive()
-    _, trajectory = skill.trajectory(np.full(9, 0.5))
-    with pytest.raises(ValueError, match=f"lasts 1.6 s at most, the recording {duration:g} s; is it in milliseconds"):
-        skill.correspondence(np.linspace(0, duration, len(trajectory)), trajectory)
+def swinging(frequencies: tuple[float, float] = (0.2, 2.0)) -> Sinusoids:
+    return Sinusoids(Box(np.array([-1.0, 0.0]), np.array([1.0, 4.0])), frequencies)
 
 
-def test_a_recording_with_fewer_samples_than_knots_is_refused() -> None:
-    with pytest.raises(ValueError, match="trajectory needs 4 samples"):
-        primitive().correspondence(np.arange(3.0), np.zeros((3, 2)))
+TIMES = 0.05 * np.arange(100)
 
 
-@pytest.mark.parametrize("theta", [np.full(8, 0.5), np.full(9, 1.1), np.full(9, np.nan), np.full(9, -1e-9)])
-def test_a_theta_outside_the_box_has_no_trajectory(theta: Array) -> None:
-    with pytest.raises(ValueError, match="theta must"):
-        primitive().trajectory(theta)
+def test_a_sinusoid_has_the_amplitude_phase_offset_and_frequency_of_its_theta() -> None:
+    theta = np.array([0.5, 0.25, 0.5, 0.0, 0.0, 1.0, 0.5])  # half a range from its top; still, at .5 above the middle
+    commands = swinging((0.5, 1.5)).at(theta, np.array([0.0, 0.25, 0.5, 1.0]))  # 1 Hz
+    np.testing.assert_allclose(commands[:, 0], [0.5, 0, -0.5, 0.5], atol=1e-15)
+    np.testing.assert_allclose(commands[:, 1], 3.0)
 
 
-def test_a_primitive_without_time_or_width_is_refused() -> None:
-    for durations in ((0.0, 1.0), (1.0, 1.0), (2.0, 1.0), (np.nan, 1.0)):
-        with pytest.raises(ValueError, match="durations"):
-            GaussianPrimitive(JOINTS, durations)
-    for sharpness in (0.0, np.nan):
-        with pytest.raises(ValueError, match="sharpness"):
-            GaussianPrimitive(JOINTS, DURATIONS, sharpness=sharpness)
+@pytest.mark.parametrize("seed", range(3))
+def test_what_a_sinusoid_plays_gives_its_theta_back(seed: int) -> None:
+    theta = 0.25 + 0.5 * swinging().policies.sample(stream(seed, "theta"))  # so that nothing is clipped
+    np.testing.assert_allclose(swinging().correspondence(TIMES, swinging().at(theta, TIMES)), theta, atol=1e-4)
+
+
+def test_a_recording_out_of_range_is_translated_to_the_nearest_sinusoid_in_pi() -> None:
+    theta = swinging().correspondence(TIMES, 10 * np.sin(np.outer(TIMES, [1.0, 2.0])))
+    assert swinging().policies.contains(theta)
+
+
+def lasting(duration: float) -> Array:
+    """theta_d of a recording."""
+    return primitive().correspondence(np.linspace(0, duration, 10), np.full((10, 2), 0.5))
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        *((lambda n=n: lasting(n), f"lasts 1.6 s at most, the recording {n:g} s; is") for n in (1.61, 1400.0)),
+        (lambda: primitive().correspondence(np.arange(3.0), np.zeros((3, 2))), "trajectory needs 4 samples"),
+        *((lambda x=x: primitive().trajectory(np.full(9, x)), "theta must") for x in (1.1, np.nan, -1e-9)),
+        (lambda: primitive().trajectory(np.full(8, 0.5)), "theta must"),
+        *(
+            (lambda x=x: GaussianPrimitive(JOINTS, x), "durations")
+            for x in ((0.0, 1.0), (1.0, 1.0), (2.0, 1.0), (np.nan, 1.0))
+        ),
+        *((lambda x=x: primitive(sharpness=x), "sharpness") for x in (0.0, np.nan)),
+        (lambda: swinging((2.0, 1.0)), "frequencies"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(call: Callable[[], object], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        call()

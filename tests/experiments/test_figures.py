@@ -5,7 +5,7 @@ import pytest
 from matplotlib.colors import to_hex
 
 from evidence import Evidence, NotRun
-from figures import FIGURES, LEARNERS, main
+from figures import FIGURES, main
 from made_lives import write_lives
 from made_up import MOVEMENTS, write_rows
 from page_tables import GAIN
@@ -56,14 +56,6 @@ def test_a_curve_is_the_mean_over_seeds_in_the_colour_of_its_algorithm_with_its_
     assert np.diff(heights).min() > 0.05 * ax.get_ylim()[1]  # no two names overlap
 
 
-def test_the_papers_five_learners_are_shown_in_the_small_space_and_three_in_the_large_one(found):
-    small, large = FIGURES["paper"](found).axes
-    assert [line.get_label() for line in small.lines] == [NAMES[name] for name in LEARNERS]
-    shown = {line.get_label(): line.get_ydata()[-1] for line in large.lines}
-    assert shown["SGIM-D"] == pytest.approx(found.error("sgim-d-large").value)
-    assert len(shown) == 3
-
-
 def test_each_step_of_the_gain_that_was_run_has_a_row_from_the_top(found):
     (ax,) = FIGURES["gain"](found).axes
     labels = [label.get_text() for label in ax.get_yticklabels()]
@@ -72,14 +64,6 @@ def test_each_step_of_the_gain_that_was_run_has_a_row_from_the_top(found):
     points = {line.get_ydata()[0]: line.get_xdata()[0] for line in ax.lines if line.get_marker() == "o"}
     assert points[0] == found.error("random", 1000).value
     assert ax.get_ylim()[0] > ax.get_ylim()[1]
-
-
-def test_interest_is_compared_with_uniform_goals_where_both_were_run(found):
-    (ax,) = FIGURES["curiosity"](found).axes
-    labels = [label.get_text() for label in ax.get_yticklabels()]
-    assert len(labels) == 4
-    points = [line.get_xdata()[0] for line in ax.lines if line.get_marker() == "o"]
-    assert points[0] == found.ratio("sgim-d-large", "sgim-d-uniform-large").value < 1
 
 
 @pytest.mark.parametrize(("missing", "left_out"), [("sagg-riac-large", {"paper"}), ("practice-taught", {"learning"})])
@@ -92,19 +76,6 @@ def test_only_those_figures_are_left_out_that_need_a_variant(tmp_path, capsys, m
         assert f"{name} is left out; not run: {missing}" in capsys.readouterr().err
     for name in {*FIGURES} - left_out:
         assert FIGURES[name](Evidence.of(folder)).axes
-
-
-def test_a_file_in_the_way_ends_with_one_line(folder, tmp_path, capsys):
-    (tmp_path / "out").write_text("thesis")
-    assert draw("--results", folder, "--out", tmp_path / "out") == 2
-    assert f"{tmp_path / 'out'} cannot be made" in capsys.readouterr().err.splitlines()[-1]
-
-
-def test_the_help_names_every_figure(capsys):
-    with pytest.raises(SystemExit):
-        main(["--help"])
-    said = capsys.readouterr().out
-    assert all(f"\n  {name} " in said for name in FIGURES)
 
 
 def test_the_shares_of_the_learners_that_are_best_add_up_to_one(found):

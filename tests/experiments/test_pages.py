@@ -1,6 +1,7 @@
 """The pages of results: made of rows and templates alone, every row for a page, what is missing named."""
 
 import re
+from itertools import chain
 from pathlib import Path
 
 import pytest
@@ -116,7 +117,10 @@ def test_each_setting_of_a_rival_is_an_option_of_a_run(rival):
         words = ["--algorithm", "sgim-d", "--goals", "uniform", "--inverse", "nearest", "--search", "perturb"]
     for setting in {*table.setting[table.rival == rival]} - {"default"}:
         name, value = setting.split("=")
-        parse([*words, f"--{'search.' * (name == 'sd' and '--search' in words)}{name}", value])
+        chosen = {f"--{'search.' * (name == 'sd' and '--search' in words)}{name}": value}
+        if rival.startswith("isoline"):
+            words[1], chosen = words[1].replace("isoline", "map-elites"), {"--sd": "0.02", "--line": "0.2", **chosen}
+        parse([*words, *chain(*chosen.items())])
 
 
 def test_the_page_of_rivals_has_the_default_and_the_best_setting(tmp_path):

@@ -9,10 +9,12 @@ import robots
 from changing import ARM, GRADUAL, SIMULATOR, UNDONE, Changing, errors
 from evidence import Evidence, NotRun
 from judging import judge
-from made_lives import write_lives
+from lives import make_lives
+from made_lives import ALIVE, life, write_lives
 from random_robots import FAMILIES, LEARNERS, RandomRobot, kind
 from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.environments.planar_arm import PlanarArm
+from table import merge, read_table
 
 CLAIMS = {"any_robot": robots.any_robot, "changes": robots.changes}
 
@@ -126,3 +128,20 @@ def test_where_every_bar_is_cleared_every_claim_holds(tmp_path, page):
 def test_a_claim_that_the_rows_contradict_fails(tmp_path, page, claim, spoilt):
     (verdict,) = judge([CLAIMS[page](found_in(tmp_path, spoilt))[claim]])
     assert verdict.verdict == "fails", verdict
+
+
+def test_lives_that_the_table_has_are_not_made_again_and_the_others_get_their_rows(tmp_path):
+    kept = {"number": 1, "learner": "practice", "movements": 2, "error": 9.0, "noticed": 5}
+    merge(tmp_path, "random.csv", [kept])
+    make_lives(tmp_path, "random.csv", life, ALIVE, processes=1)
+    rows = read_table(tmp_path, "random.csv").set_index(["number", "learner", "movements"])
+    assert rows.error.to_dict() == {
+        (0, "practice", 1): 0.5,
+        (0, "practice", 2): 0.25,
+        (0, "random", 1): 0.5,
+        (0, "random", 2): 0.25,
+        (1, "practice", 2): 9.0,
+        (1, "random", 1): 0.5,
+        (1, "random", 2): 1.25,
+    }
+    assert rows.noticed[1, "random", 2] == 1

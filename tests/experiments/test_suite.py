@@ -19,7 +19,7 @@ def suite(*words):
 
 
 def configs_of(*words):
-    return runs_of(*parsed_options(words))[0]
+    return runs_of(*parsed_options(words))
 
 
 def test_half_of_the_tasks_and_no_more_are_used_to_choose_defaults():

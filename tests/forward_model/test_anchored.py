@@ -34,7 +34,7 @@ def predict(near, thetas):
         return [part.numpy() for part in near.predict(near.tensor(thetas))]
 
 
-def test_a_remembered_movement_is_predicted_where_it_landed(model, memory, fixed):
+def test_at_an_anchor_the_prediction_is_its_outcome(model, memory, fixed):
     fixed(share=0.0)
     rows = np.arange(20)
     for n in (20, 1):

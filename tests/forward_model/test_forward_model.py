@@ -66,23 +66,38 @@ def test_members_disagree_more_where_nothing_was_executed(model, unseen):
     )
 
 
-def test_it_finds_out_which_movements_are_noisy_and_how_noisy():
-    model = taught(remembered(3000, noise=0.3), rate=0.5)
-    thetas = np.array([[0.35, 0.5, 0.5], [0.65, 0.5, 0.5]])  # noise of .3 * theta_0 a dimension
+def test_the_predicted_noise_is_that_of_each_movement_and_without_noise_heads_their_mean():
+    memory, unseen = remembered(3000, noise=0.3), remembered(1000, noise=0.3, seed=1)  # noise of .3 * theta_0
+    model = taught(memory, rate=0.5)
+    thetas = np.array([[0.35, 0.5, 0.5], [0.65, 0.5, 0.5]])
     np.testing.assert_allclose(model.predict(NO_CONTEXT, thetas).aleatoric.mean(axis=1), 0.3 * thetas[:, 0], rtol=0.3)
-
-
-def test_eighty_percent_regions_hold_about_eighty_percent():
-    unseen = remembered(1000, noise=0.3, seed=1)
-    mean, epistemic, aleatoric = taught(remembered(2000, noise=0.3), rate=0.5).predict(NO_CONTEXT, unseen.thetas)
+    mean, epistemic, aleatoric = model.predict(NO_CONTEXT, unseen.thetas)
     assert 0.7 < coverage(unseen.outcomes, mean, np.hypot(epistemic, aleatoric), 0.8) < 0.9
+    alike = taught(remembered(1000, noise=0.3), noise_heads=False, rate=0.4).predict(NO_CONTEXT, memory.thetas)
+    np.testing.assert_allclose(alike.aleatoric, np.tile(alike.aleatoric[0], (3000, 1)), rtol=1e-6)
+    np.testing.assert_allclose(alike.aleatoric[0], 0.3 * np.sqrt((memory.thetas[:, 0] ** 2).mean()), rtol=0.3)
 
 
-def test_without_noise_heads_it_predicts_one_noise_everywhere_the_mean():
-    memory = remembered(1000, noise=0.3)
-    aleatoric = taught(memory, noise_heads=False, rate=0.4).predict(NO_CONTEXT, memory.thetas).aleatoric
-    np.testing.assert_allclose(aleatoric, np.broadcast_to(aleatoric[0], aleatoric.shape), rtol=1e-6)
-    np.testing.assert_allclose(aleatoric[0], 0.3 * np.sqrt((memory.thetas[:, 0] ** 2).mean()), rtol=0.3)
+N = 20_000
+FOUR_ERRORS = 4 * 0.5 / np.sqrt(N)  # standard errors of a share of N, at most; failure odds 6e-5 for each
+
+
+@pytest.mark.parametrize("dim", [1, 2, 3])
+def test_outcomes_drawn_from_the_predicted_gaussian_fill_each_region_to_its_level(dim):
+    mean = np.zeros((N, dim))
+    spread = np.broadcast_to(np.array([0.02, 0.5, 3.0])[:dim], mean.shape)
+    outcomes = stream(0, "outcomes").normal(mean, spread)
+    for level in (0.1, 0.5, 0.8, 0.95, 0.99):
+        assert coverage(outcomes, mean, spread, level) == pytest.approx(level, abs=FOUR_ERRORS)
+
+
+def test_the_region_is_an_ellipse_along_the_axes_not_a_box_or_circle():
+    mean, spread = np.zeros((5, 2)), np.tile([0.1, 1.0], (5, 1))
+    edge = np.sqrt(-2 * np.log(1 - 0.8))  # of the 80 % region, in standard deviations
+    outcomes = np.array([[0.99 * edge, 0], [1.01 * edge, 0], [0, 9.9 * edge], [0, 10.1 * edge], [0.8 * edge, 8 * edge]])
+    inside = [coverage(row[None], mean[:1], spread[:1], 0.8) for row in outcomes * 0.1]
+    assert inside == [1, 0, 1, 0, 0]
+    assert coverage(outcomes * 0.1, mean, spread, 0.8) == pytest.approx(2 / 5)
 
 
 def test_the_gradient_equals_finite_differences_and_is_finite_at_the_goal_itself():
@@ -104,7 +119,7 @@ def test_the_seed_says_what_is_learnt_and_torchs_own_generator_and_threads_are_l
     assert torch.get_num_threads() == threads
 
 
-def test_a_refresh_waits_for_enough_new_exemplars():
+def test_a_refresh_waits_for_enough_new_exemplars_and_a_first_effect():
     model, memory = ForwardModel(0, 3, 2, every=50, rate=1.0), remembered(49)
     assert model.refresh(memory) is None
     assert not model.trained
@@ -113,6 +128,10 @@ def test_a_refresh_waits_for_enough_new_exemplars():
     before = weights(model)
     assert model.refresh(memory) is None
     assert torch.equal(weights(model), before)
+    memory, model = remember(remembered(80).thetas, np.zeros((80, 2))), ForwardModel(0, 3, 2)
+    assert model.refresh(memory) is None  # an object that was not touched
+    memory.add(NO_CONTEXT, np.full(3, 0.5), np.ones(2))
+    assert model.refresh(memory).first == 0
 
 
 def test_what_is_held_out_is_looked_at_but_never_learnt_from():
@@ -206,31 +225,27 @@ def test_a_copy_for_another_process_predicts_the_same_and_learns_on(model, unsee
     assert copy.refresh(remembered(500)).first == 400
 
 
-def test_before_it_has_learnt_it_predicts_nothing():
-    with pytest.raises(RuntimeError, match="not trained"):
-        ForwardModel(0, 3, 2).predict(NO_CONTEXT, np.full(3, 0.5))
-
-
-def test_another_robots_memory_or_another_runs_is_refused():
-    model = taught(remembered(100))
-    with pytest.raises(ValueError, match="another robot's"):
-        model.refresh(Memory(0, 4, 2))
-    with pytest.raises(ValueError, match="another run's"):
-        model.refresh(remembered(60))
-    with pytest.raises(ValueError, match="thetas"):
-        model.predict(NO_CONTEXT, np.zeros(2))
+def untaught(**options):
+    return ForwardModel(0, 3, 2, **options)
 
 
 @pytest.mark.parametrize(
-    "options",
+    ("call", "message"),
     [
-        *({"members": 0}, {"every": 0}, {"every": 2.5}),
-        *({name: value} for name in ("rate", "trust") for value in (0.0, np.nan, np.inf)),
+        (lambda model: untaught().predict(NO_CONTEXT, np.full(3, 0.5)), "not trained"),
+        (lambda model: model.refresh(Memory(0, 4, 2)), "another robot's"),
+        (lambda model: model.refresh(remembered(60)), "another run's"),
+        (lambda model: model.predict(NO_CONTEXT, np.zeros(2)), "thetas"),
+        (lambda model: untaught(members=0), "members"),
+        (lambda model: untaught(every=0), "every"),
+        (lambda model: untaught(every=2.5), "every"),
+        *((lambda model, value=value: untaught(rate=value), "rate") for value in (0.0, np.nan, np.inf)),
+        *((lambda model, value=value: untaught(trust=value), "trust") for value in (0.0, np.nan, np.inf)),
     ],
 )
-def test_numbers_out_of_their_range_are_refused(options):
-    with pytest.raises(ValueError, match=next(iter(options))):
-        ForwardModel(0, 3, 2, **options)
+def test_a_wrong_use_is_refused(model, call, message):
+    with pytest.raises((ValueError, RuntimeError), match=message):
+        call(model)
 
 
 def test_it_is_trusted_up_to_the_relative_error_that_is_named(model):
@@ -247,11 +262,3 @@ def test_other_scales_leave_what_is_predicted_as_it_is():
     model._scale(0.1 + 3 * more.thetas, 7 - 2 * more.outcomes)
     after = model.predict(NO_CONTEXT, more.thetas)
     np.testing.assert_allclose(after.mean, before.mean, atol=1e-5)
-
-
-def test_nothing_is_learnt_before_anything_has_had_an_effect():
-    memory, model = remember(remembered(80).thetas, np.zeros((80, 2))), ForwardModel(0, 3, 2)
-    assert model.refresh(memory) is None  # an object that was not touched
-    assert not model.trained
-    memory.add(NO_CONTEXT, np.full(3, 0.5), np.ones(2))
-    assert model.refresh(memory).first == 0

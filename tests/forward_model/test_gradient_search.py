@@ -49,35 +49,31 @@ def fine(monkeypatch):
 
 @pytest.fixture
 def descents(monkeypatch):
-    """What each descent was given and found: (starts, found, radius, anchored)."""
-    seen, descend = [], Anchored.descend
+    """Arguments and results of each descent: (starts, results, radius, anchored)."""
+    calls, descend = [], Anchored.descend
 
-    def watched(anchored, starts, goals, *, radius, **options):
-        found = descend(anchored, starts, goals, radius=radius, **options)
-        seen.append((starts.double().numpy(), found.double().numpy(), radius, anchored))
-        return found
+    def recorded(anchored, starts, goals, *, radius, **options):
+        results = descend(anchored, starts, goals, radius=radius, **options)
+        calls.append((starts.double().numpy(), results.double().numpy(), radius, anchored))
+        return results
 
-    monkeypatch.setattr(Anchored, "descend", watched)
-    return seen
+    monkeypatch.setattr(Anchored, "descend", recorded)
+    return calls
 
 
 def pursue(search, estimate, goal, n=10):
-    """At most ``n`` movements, and how far (m) from the goal they landed."""
-    outcomes = []
-
-    def execute(theta):
-        outcomes.append(ARM.execute(estimate.context, theta, stream(0, "any")))
-        return outcomes[-1]
-
-    thetas = drive(search(estimate, goal), execute, n)
-    return np.array(thetas), np.linalg.norm(np.array(outcomes) - goal, axis=1)
+    """At most ``n`` movements, and the distances (m) of their outcomes from the goal."""
+    thetas = np.array(
+        drive(search(estimate, goal), lambda theta: ARM.execute(estimate.context, theta, stream(0, "any")), n)
+    )
+    return thetas, np.linalg.norm(executed(ARM, thetas).outcomes - goal, axis=1)
 
 
 def nearest(make, memory, model, estimate, goals, n=10):
-    """How near each goal the best of ``n`` movements landed, on average."""
+    """Distances of the best of ``n`` movements for each goal."""
     searches = [make(problem_of(memory, model, seed=k)) for k in range(len(goals))]
-    found = [pursue(s, estimate(NO_CONTEXT, goal), goal, n)[1].min() for s, goal in zip(searches, goals, strict=True)]
-    return np.array(found)
+    pairs = zip(searches, goals, strict=True)
+    return np.array([pursue(search, estimate(NO_CONTEXT, goal), goal, n)[1].min() for search, goal in pairs])
 
 
 def test_it_comes_nearer_than_the_simplex_in_as_many_movements(few, model, inverse, goals, fixed):
@@ -88,8 +84,8 @@ def test_it_comes_nearer_than_the_simplex_in_as_many_movements(few, model, inver
     assert found.mean() < 0.5 * simplex.mean()
 
 
-def told_nothing(memory):
-    """An inverse model whose only neighbour lies far away, and tells nothing of the model's error here."""
+def far_from(memory):
+    """An inverse model with one exemplar, far from the goal, which says nothing of the model's error near the goal."""
     linear = LocallyLinear(problem_of(memory))
 
     def inverse(context, goal):
@@ -99,18 +95,16 @@ def told_nothing(memory):
     return inverse
 
 
-def test_the_outcomes_of_the_search_correct_the_models_error_here(few, biased, goals, fixed, fine):
+def test_outcomes_of_the_search_and_exemplars_of_the_estimate_correct_the_models_error(
+    few, memory, biased, goals, fixed, fine
+):
     fixed(share=0.0)
     search = partial(GradientSearch, noise=0.0)
-    first, best = (nearest(search, few, biased, told_nothing(few), goals[:4], n).mean() for n in (1, 8))
+    first, best = (nearest(search, few, biased, far_from(few), goals[:4], n).mean() for n in (1, 8))
     assert best < 0.03 < 0.1 < first
-
-
-def test_neighbours_of_the_estimate_already_correct_the_first_movement(memory, biased, goals, fixed, fine):
-    fixed(share=0.0)
-    inverses, search = (LocallyLinear(problem_of(memory)), told_nothing(memory)), partial(GradientSearch, noise=0.0)
-    corrected, alone = (nearest(search, memory, biased, inverse, goals[:5], n=1).mean() for inverse in inverses)
-    assert corrected < alone / 2
+    inverses = LocallyLinear(problem_of(memory)), far_from(memory)
+    near, far = (nearest(search, memory, biased, inverse, goals[:5], n=1).mean() for inverse in inverses)
+    assert near < far / 2
 
 
 def test_no_movement_is_planned_outside_of_the_trust_region_or_the_box(
@@ -185,7 +179,7 @@ def test_with_a_model_that_is_not_trusted_it_is_the_simplex_bit_for_bit(few, mod
     assert not np.array_equal(asked[0], found[0])
 
 
-def test_a_model_that_becomes_good_enough_is_asked_for_the_next_goal(few, model, inverse, goals):
+def test_a_model_that_becomes_good_enough_is_used_for_the_next_goal(few, model, inverse, goals):
     search, estimate = GradientSearch(problem_of(few), noise=0.0), inverse(NO_CONTEXT, goals[0])
     pursue(search, estimate, goals[0], n=2)
     search.model.load_state_dict(model.state_dict())
@@ -193,13 +187,12 @@ def test_a_model_that_becomes_good_enough_is_asked_for_the_next_goal(few, model,
     np.testing.assert_array_equal(next(search(estimate, goals[0])), next(expected(estimate, goals[0])))
 
 
-def test_the_same_seed_makes_the_same_movements_and_the_model_stays_as_it_is(few, model, inverse, goals):
+def test_a_seed_makes_the_same_movements_and_the_model_does_not_change(few, model, inverse, goals):
     searches, random = [GradientSearch(problem_of(few, model, seed=k)) for k in (3, 3, 4)], torch.random.get_rng_state()
     one, same, other = (pursue(search, inverse(NO_CONTEXT, goals[0]), goals[0], 4)[0] for search in searches)
     np.testing.assert_array_equal(one, same)
     assert not np.array_equal(one, other)
-    learnt = zip(model.state_dict().values(), searches[0].model.state_dict().values(), strict=True)
-    assert all(torch.equal(was, now) for was, now in learnt)
+    assert all(map(torch.equal, model.state_dict().values(), searches[0].model.state_dict().values()))
     assert torch.equal(torch.random.get_rng_state(), random)
 
 

@@ -1,12 +1,14 @@
 """Runs with a forward model: what they record and report, what they refuse, and that a stop leaves no trace."""
 
+import importlib
 import re
+import sys
 
 import numpy as np
 import pytest
 
 from boards import curves_of
-from runs import LIVE, RUN, content_of, end, start, stopped_at
+from runs import content_of
 from sgimd_torch.board.legend import LEGEND
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import Benchmark, save_benchmark
@@ -22,38 +24,32 @@ from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.run import Seconds
 from sgimd_torch.runs.signals import command
 from sgimd_torch.spaces import Episode, Move, stream
+from worlds import NO_CONTEXT
 
 MOVEMENTS = 170
 MODEL = ("--inverse", "model-alone", "--search", "gradient", "--inverse.rate", 2)
 TAGS = {tag for tag in LEGEND if tag.startswith("model/")}
-NO_CONTEXT = np.empty(0)
 
 
 @pytest.fixture(scope="module")
-def arguments(tmp_path_factory):
-    """Those of a short run on an arm, with three goals to evaluate it on; later options win."""
+def live(tmp_path_factory):
+    """Runs ``sgimd run`` with these options on an arm, with three goals of evaluation; returns the run's directory."""
     path = tmp_path_factory.mktemp("benchmark") / "arm.npz"
     save_benchmark(path, Benchmark("PlanarArm", np.array([[0.0, 0.6], [0.3, -0.5], [-0.4, 0.4]]), 0.1))
-    short = f"--algorithm sgim-d --environment planar-arm-7 --seed 3 --movements {MOVEMENTS}"
-    short = f"{short} --evaluate_at 120 --repeats 0"
+    short = f"--algorithm sgim-d --environment planar-arm-7 --seed 3 --movements {MOVEMENTS} --evaluate_at 120"
 
-    def arguments(out, *options):
-        return [str(word) for word in (*short.split(), "--benchmark", path, "--out", out, *options)]
+    def live(out, *options):
+        words = (*short.split(), "--repeats", 0, "--benchmark", path, "--out", out, *options)
+        assert command(main, [str(word) for word in words]) == 0
+        return out / "sgim-d" / "seed-003"
 
-    return arguments
-
-
-@pytest.fixture(scope="module")
-def live(arguments):
-    return lambda out, *options: command(main, arguments(out, *options))
+    return live
 
 
 @pytest.fixture(scope="module")
 def reference(tmp_path_factory, live):
     """Directory of a whole run that searches and answers through the model, and is watched."""
-    out = tmp_path_factory.mktemp("model")
-    assert live(out, *MODEL, "--board", "true") == 0
-    return out / "sgim-d" / "seed-003"
+    return live(tmp_path_factory.mktemp("model"), *MODEL, "--board", "true")
 
 
 def table(directory, name):
@@ -63,23 +59,15 @@ def table(directory, name):
         return columns, np.array(list(record.rows(name)), dtype=np.float64)
 
 
-def test_every_movement_after_the_first_refresh_was_predicted_and_is_recorded_with_its_outcome(reference):
-    columns, predictions = table(reference, "predictions")
-    parts = [[f"{part}_{k}" for k in (0, 1)] for part in ("outcome", "predicted", "epistemic", "aleatoric")]
-    assert columns == ["exemplar", *np.ravel(parts)]
-    assert predictions[:, 0].tolist() == list(range(50, 150))  # what is newer waits for the next refresh
-    outcome, _, epistemic, aleatoric = np.split(predictions[:, 1:], 4, axis=1)
-    np.testing.assert_array_equal(outcome, read_run(reference).outcomes[50:150])
-    assert (epistemic > 0).all()
-    assert (aleatoric > 0).all()
-
-
 def test_recorded_predictions_are_those_of_a_model_of_all_earlier_movements(reference):
+    columns, predictions = table(reference, "predictions")
+    kinds = [[f"{kind}_{k}" for k in (0, 1)] for kind in ("outcome", "predicted", "epistemic", "aleatoric")]
+    assert columns == ["exemplar", *np.ravel(kinds)]
+    assert predictions[:, 0].tolist() == list(range(50, 150))  # newer movements wait for the next refresh
     run, memory, model = read_run(reference), Memory(0, 7, 2), ForwardModel(0, 7, 2, seed=3, rate=2.0)
-    _, predictions = table(reference, "predictions")
+    np.testing.assert_array_equal(predictions[:, 1:3], run.outcomes[50:150])
     for n in (50, 100):
-        for k in range(len(memory), n):
-            memory.add(NO_CONTEXT, run.thetas[k], run.outcomes[k])
+        memory.extend(run.contexts[n - 50 : n], run.thetas[n - 50 : n], run.outcomes[n - 50 : n])
         model.refresh(memory)
         predicted = np.hstack(model.predict(NO_CONTEXT, run.thetas[n : n + 50]))
         np.testing.assert_array_equal(predictions[n - 50 : n, 3:], predicted)
@@ -97,53 +85,29 @@ def test_every_refresh_is_recorded(reference):
 
 def test_a_run_made_longer_equals_a_long_run_and_so_does_its_board(tmp_path, live, reference):
     watched = (*MODEL, "--board", "true")
-    assert live(tmp_path, *watched, "--movements", 120) == 0
-    directory = tmp_path / "sgim-d" / "seed-003"
+    directory = live(tmp_path, *watched, "--movements", 120)
     assert table(directory, "predictions")[1][:, 0].tolist() == list(range(50, 100))
-    assert live(tmp_path, *watched, "--resume") == 0
+    live(tmp_path, *watched, "--resume")
     assert content_of(directory) == content_of(reference)
     resumed, whole = curves_of(directory), curves_of(reference)
-    for tag in TAGS:
-        assert resumed[tag] == whole[tag], tag
+    assert {tag for tag in whole if tag.startswith("model/")} == TAGS
+    assert {tag: resumed[tag] for tag in TAGS} == {tag: whole[tag] for tag in TAGS}
 
 
-def test_a_run_that_is_killed_and_resumed_ends_as_if_it_never_was(tmp_path, arguments, live, reference):
-    end(stopped_at(110, *arguments(tmp_path, *MODEL)))  # unwatched, too, which changes nothing
-    assert live(tmp_path, *MODEL, "--resume") == 0
-    assert content_of(tmp_path / "sgim-d" / "seed-003") == content_of(reference)
+def test_without_its_packages_the_model_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "lightning", None)
+    monkeypatch.delitem(sys.modules, "sgimd_torch.forward_model")
+    with pytest.raises(ImportError, match=r"the forward model needs torch: pip install 'sgimd-torch\[forward\]'"):
+        importlib.import_module("sgimd_torch.forward_model")
 
 
-def test_a_run_without_a_model_writes_no_record_of_one_and_loads_no_library_for_it(tmp_path, arguments):
-    heavy = {"torch", "lightning", "tensorboard", "matplotlib"}
-    loaded = f"{heavy} & set(sys.modules)"
-    program = f"{RUN}; code = command_line.main(sys.argv[1:]); print({loaded}); sys.exit(code)"
-    process = start(program, *arguments(tmp_path, "--movements", 60))
-    output, errors = process.communicate()
-    assert process.returncode == 0, errors
-    assert output.splitlines()[-1] == "set()"
-    run = read_run(tmp_path / "sgim-d" / "seed-003")
-    assert run.predictions is run.refreshes is None
-    assert "seconds_model" not in run.summary
-
-
-def test_without_its_packages_a_run_with_a_model_is_refused_and_says_what_to_install(tmp_path, arguments):
-    program = f"import sys; sys.modules['lightning'] = None; {LIVE}"
-    process = start(program, *arguments(tmp_path / "out", *MODEL))
-    _, errors = process.communicate()
-    assert process.returncode == 2
-    assert "error: the forward model needs torch: pip install 'sgimd-torch[forward]'" in errors
-    assert "Traceback" not in errors
-    assert not (tmp_path / "out").exists()
-
-
-def test_a_model_that_is_asked_is_announced_once(tmp_path, live, capsys):
-    assert live(tmp_path, *MODEL, "--movements", 110) == 0
-    said = capsys.readouterr().err
-    found = re.findall(r"movement (\d+): the forward model is used from here on: its relative error is (\S+), ", said)
-    assert [movements for movements, _ in found] == ["50"]
-    refreshes = table(tmp_path / "sgim-d" / "seed-003", "refreshes")[1]
-    assert float(found[0][1]) == pytest.approx(refreshes[0, 4], abs=6e-4)
-    assert "not asked" not in said
+def test_a_model_that_is_used_is_announced_once(tmp_path, live, capsys):
+    directory = live(tmp_path, *MODEL, "--movements", 110)
+    text = capsys.readouterr().err
+    used = re.findall(r"movement (\d+): the forward model is used from here on: its relative error is (\S+), ", text)
+    assert [movements for movements, _ in used] == ["50"]
+    assert float(used[0][1]) == pytest.approx(table(directory, "refreshes")[1][0, 4], abs=6e-4)
+    assert "is not used" not in text
 
 
 @pytest.mark.parametrize(
@@ -153,104 +117,76 @@ def test_a_model_that_is_asked_is_announced_once(tmp_path, live, capsys):
         (("--movements", 60, "--inverse.rate", 0.02), r"its relative error is \d\.\d+, it is trusted up to 0\.25", 1),
     ],
 )
-def test_a_model_that_was_never_asked_is_reported(tmp_path, live, capsys, options, why, rows):
-    assert live(tmp_path, *MODEL, *options) == 0
-    said = capsys.readouterr().err
-    assert re.search(f"the forward model is not used, the learner goes on without it: {why}\n", said)
-    run = read_run(tmp_path / "sgim-d" / "seed-003")
+def test_a_model_that_was_never_used_is_reported(tmp_path, live, capsys, options, why, rows):
+    run = read_run(live(tmp_path, *MODEL, *options))
+    message = f"the forward model is not used, the learner goes on without it: {why}\n"
+    assert re.search(message, capsys.readouterr().err)
     assert (0 if run.refreshes is None else len(run.refreshes["movements"])) == rows
     assert run.predictions is None
 
 
-def remember(memory, n):
-    """What ``episode`` returns for each of ``n`` random movements of an arm, which are remembered."""
-    arm, rng = PlanarArm(7), stream(0, "exemplars")
-    for index in range(n):
-        theta, goal = rng.random(7), np.full(2, index // 2)  # two movements for each goal
-        outcome = arm.execute(NO_CONTEXT, theta, rng)
-        memory.add(NO_CONTEXT, theta, outcome)
-        yield Episode(index, NO_CONTEXT, Move(theta, goal, "local"), outcome, None)
-
-
 @pytest.fixture
-def record(tmp_path):
+def listen(tmp_path):
+    """Function that gives a listener ``n`` movements of an arm; ``before(index, model)`` comes before each of them."""
     with Record.make(tmp_path / FILE, (0, 7, 2), {}) as record:
-        yield record
+
+        def listen(n, before=lambda index, model: None):
+            model, memory, arm = ForwardModel(0, 7, 2, rate=1.0), Memory(0, 7, 2), PlanarArm(7)
+            listener = ModelListener(record, model, lambda: model.trusted, memory, Seconds({}))
+            rng, curves = stream(0, "exemplars"), []
+            for index in range(n):
+                theta = rng.random(7)
+                memory.add(NO_CONTEXT, theta, arm.execute(NO_CONTEXT, theta, rng))
+                before(index, model)
+                move = Move(theta, np.full(2, index // 2), "local")
+                listener.episode(Episode(index, NO_CONTEXT, move, memory.outcomes[-1], None), replayed=False)
+                curves.append(listener.curves())
+            return record, model, curves
+
+        yield listen
 
 
-def test_a_divergence_is_told_and_recorded(record, capsys):
-    model, memory = ForwardModel(0, 7, 2, rate=1.0), Memory(0, 7, 2)
-    listener = ModelListener(record, model, lambda: model.trusted, memory, Seconds({}))
-    for episode in remember(memory, 150):
-        if episode.index == 99:
+def test_a_divergence_is_told_and_recorded(listen, capsys):
+    def spoil(index, model):
+        if index == 99:
             model.lr, model._online.optimizer = 1e30, None
-        if episode.index == 149:
+        if index == 149:
             model.lr = 1e-2
-        listener.episode(episode, replayed=False)
-        assert bool(listener.curves()) == ((episode.index + 1) % 50 == 0)
-    said = capsys.readouterr().err
-    assert said.count("movement 100: training diverged; the forward model keeps its last good weights") == 1
+
+    record, _, curves = listen(150, spoil)
+    assert [index for index, numbers in enumerate(curves) if numbers] == [49, 99, 149]
+    text = "movement 100: training diverged; the forward model keeps its last good weights"
+    assert capsys.readouterr().err.count(text) == 1
     assert [row[-1] for row in record.rows("refreshes")] == [0, 1, 0]
 
 
-def test_the_curves_are_those_of_the_newest_refresh(record):
-    model, memory = ForwardModel(0, 7, 2, rate=1.0), Memory(0, 7, 2)
-    listener = ModelListener(record, model, lambda: model.trusted, memory, Seconds({}))
-    episodes = list(remember(Memory(0, 7, 2), 100))
-    for episode in episodes:
-        memory.add(NO_CONTEXT, episode.move.theta, episode.outcome)
-        listener.episode(episode, replayed=False)
-        if episode.index == 49:
-            assert listener.curves().keys() == TAGS - {"model/error", "model/coverage"}
-    curves = listener.curves()
-    assert curves.keys() == TAGS
-    assert curves["model/relative_error"] == model.relative_error
+def test_the_curves_are_those_of_the_newest_refresh(listen):
+    record, model, curves = listen(100)
+    assert curves[49].keys() == TAGS - {"model/error", "model/coverage"}
+    assert curves[99].keys() == TAGS
+    assert curves[99]["model/relative_error"] == model.relative_error
     predictions = np.array(list(record.rows("predictions")))
     outcome, predicted, epistemic, aleatoric = np.split(predictions[:, 1:], 4, axis=1)
-    assert curves["model/error"] == pytest.approx(np.linalg.norm(outcome - predicted, axis=1).mean())
+    assert curves[99]["model/error"] == pytest.approx(np.linalg.norm(outcome - predicted, axis=1).mean())
     squared = ((outcome - predicted) ** 2 / (epistemic**2 + aleatoric**2)).sum(axis=1)
-    assert curves["model/coverage"] == (squared < -2 * np.log(0.2)).mean()  # chi-squared, two dimensions
+    assert curves[99]["model/coverage"] == (squared < -2 * np.log(0.2)).mean()  # chi-squared, two dimensions
 
 
-def test_a_run_through_the_model_makes_one_of_the_size_of_its_robot():
-    environments = {"planar-arm-50": 50, "fishing-rod": 25}
+def test_a_run_through_the_model_makes_one_of_the_size_of_its_robot_with_its_options():
     networks = {"inverse.members": 2, "inverse.rate": 1.5, "inverse.noise_heads": False, "inverse.trust": 0.2}
-    for environment, theta_dim in environments.items():
-        parts = {"search": "gradient", "inverse": "model", "environment": environment, **networks}
-        learner = build(Config(algorithm="sagg-riac", parts=parts)).learner
-        (shared,) = learner.problem.trained
-        model = shared.model
-        assert model is learner.inverse.model
-        assert model.sizes == {"context_dim": 0, "theta_dim": theta_dim, "outcome_dim": 2}
-        assert (model.members, model.rate, model.noise_heads, model.trust) == (2, 1.5, False, 0.2)
+    parts = {"search": "gradient", "inverse": "model", "environment": "fishing-rod", **networks}
+    learner = build(Config(algorithm="sagg-riac", parts=parts)).learner
+    (shared,) = learner.problem.trained
+    model = shared.model
+    assert model is learner.inverse.model
+    assert model.sizes == {"context_dim": 0, "theta_dim": 25, "outcome_dim": 2}
+    assert (model.members, model.rate, model.noise_heads, model.trust) == (2, 1.5, False, 0.2)
     assert build(Config(parts={"search": "nelder-mead"})).learner.problem.trained == []
 
 
-@pytest.mark.parametrize(
-    "option",
-    [
-        *(("--inverse.members", 1), ("--inverse.noise_heads", "false")),
-        *(("--inverse.trust", 0.01), ("--search", "nelder-mead")),
-    ],
-)
-def test_an_option_of_the_model_changes_the_run(tmp_path, live, reference, option):
-    assert live(tmp_path, *MODEL, *option, "--movements", 100) == 0
-    changed, whole = (content_of(place)["events"] for place in (tmp_path / "sgim-d" / "seed-003", reference))
-    assert changed != whole[: len(changed)]
-    assert changed[:50] == whole[:50]  # until it is asked
-
-
-def test_the_board_shows_how_the_model_does_and_explains_it(reference):
-    curves, (_, refreshes) = curves_of(reference), table(reference, "refreshes")
-    assert {tag for tag in curves if tag.startswith("model/")} == TAGS
-    assert curves["model/relative_error"] == pytest.approx(dict(zip(refreshes[:, 0], refreshes[:, 4], strict=True)))
-    assert curves["model/error"].keys() == curves["model/coverage"].keys() == {100, 150}
-
-
 def test_a_run_that_learns_a_model_but_answers_without_it_is_evaluated_by_both(tmp_path, live):
-    options = ("--search", "gradient", "--inverse", "linear", "--evaluated-by", "own,nearest,linear,model-alone")
-    assert live(tmp_path, *options) == 0
-    evaluations = read_run(tmp_path / "sgim-d" / "seed-003").evaluations
-    assert list(evaluations) == ["own", "nearest", "linear", "model-alone"]
-    errors = {inverse: columns["mean_error"].tolist() for inverse, columns in evaluations.items()}
+    evaluated = ("--evaluated-by", "own,nearest,linear,model-alone")
+    run = read_run(live(tmp_path, "--search", "gradient", "--inverse", "linear", *evaluated))
+    errors = {inverse: numbers["mean_error"].tolist() for inverse, numbers in run.evaluations.items()}
+    assert list(errors) == ["own", "nearest", "linear", "model-alone"]
     assert errors["own"] == errors["linear"] != errors["model-alone"]

@@ -140,17 +140,6 @@ def test_wrong_outcomes_leave_the_learner_waiting(outcomes, error):
     assert len(learner.memory) == 3
 
 
-def test_telling_out_of_turn_and_asking_for_nobody_are_refused():
-    learner = practice(ARM, 0)
-    with pytest.raises(RuntimeError, match=r"ask.. has not proposed one"):
-        learner.tell_many(RIGHT)
-    with pytest.raises(ValueError, match="a context for each robot, got none"):
-        learner.ask_many([])
-    learner.ask_many([NO_CONTEXT] * 2)
-    with pytest.raises(RuntimeError, match=r"was tell.. forgotten"):
-        learner.ask_many([NO_CONTEXT] * 2)
-
-
 class Together(PlanarArm):
     """Does to a whole group what a test wants."""
 

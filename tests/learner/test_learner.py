@@ -1,5 +1,7 @@
 """The learner: ask, execute, tell; a demonstration interrupts; what cannot be right is refused and changes nothing."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -67,19 +69,32 @@ def test_every_outcome_reaches_memory_and_its_attempt_and_the_next_attempt_begin
     assert (len(pursuit.contexts), pursuit.n_ended) == (3, 2)
 
 
-def test_ask_and_tell_alternate() -> None:
+def asked() -> Learner:
     robot = learner(Pursuit())
-    with pytest.raises(RuntimeError, match="ask"):
-        robot.tell([0.0, 0.0])
     robot.ask(NO_CONTEXT)
-    with pytest.raises(RuntimeError, match="tell"):
-        robot.ask(NO_CONTEXT)
-    with pytest.raises(RuntimeError, match="tell"):
-        robot.watch(LESSON)
-    robot.tell([0.0, 0.0])
-    with pytest.raises(RuntimeError, match="ask"):
-        robot.tell([0.0, 0.0])
-    assert len(robot.memory) == 1
+    return robot
+
+
+OUT_OF_TURN = {  # message: a learner, and what it refuses
+    "ask() has not proposed one": (lambda: learner(Pursuit()), lambda robot: robot.tell([0.0, 0.0])),
+    "a context for each robot, got none": (lambda: learner(Pursuit()), lambda robot: robot.ask_many([])),
+    "go_on_alone() needs a request": (lambda: learner(Pursuit()), lambda robot: robot.go_on_alone("")),
+    "was tell() forgotten? Without one, interrupt()": (asked, lambda robot: robot.ask(NO_CONTEXT)),
+    "watch() needs the outcome of the last movement first": (asked, lambda robot: robot.watch(LESSON)),
+    "add() needs the outcome of the last movement first": (
+        *(asked, lambda robot: robot.add(NO_CONTEXT, [0.5] * 4, [0.9, 0.1])),
+    ),
+}
+
+
+@pytest.mark.parametrize("message", OUT_OF_TURN)
+def test_what_comes_out_of_turn_is_refused_and_changes_nothing(message: str) -> None:
+    begin, act = OUT_OF_TURN[message]
+    robot = begin()
+    waits = bool(robot._asked)
+    with pytest.raises((RuntimeError, ValueError), match=re.escape(message)):
+        act(robot)
+    assert (len(robot.memory), robot.movements, bool(robot._asked)) == (0, 0, waits)
 
 
 DIVERGED = r"outcome .*did the simulation diverge.*theta was \[0\.1, 0\.1, 0\.1, 0\.1\]"
@@ -187,9 +202,6 @@ def test_a_movement_made_elsewhere_enters_memory_but_counts_as_none() -> None:
     ):
         with pytest.raises(ValueError, match=said):
             robot.add(NO_CONTEXT, theta, outcome)
-    robot.ask(NO_CONTEXT)
-    with pytest.raises(RuntimeError, match=r"was tell\(\) forgotten"):
-        robot.add(NO_CONTEXT, [0.5] * 4, [0.9, 0.1])
     assert (len(robot.memory), robot.movements, kinds) == (1, 0, ["added"])
 
 

@@ -184,15 +184,19 @@ class BreaksOff(CountingArm):
         return super().execute(context, theta, rng)
 
 
-def test_after_a_movement_that_was_broken_off_a_run_goes_on_when_it_is_given_up() -> None:
-    arm = BreaksOff(16)
-    learner = make("sagg-riac", arm)
+@pytest.mark.parametrize("after", [4, 15, 16])
+def test_a_life_saved_where_a_movement_was_broken_off_goes_on_as_if_it_never_was(after: int, tmp_path: Path) -> None:
+    """A lesson waits in the movement after 15 others, since the teacher has just offered it."""
+    other = PlanarArm(5, noise=0.05)
+    whole = life("sgim-d", other, 60, every=5)
+    arm = BreaksOff(after)
+    learner = make("sgim-d", arm)
     with pytest.raises(KeyboardInterrupt):
-        list(run(learner, arm, 0, movements=60))
-    with pytest.raises(RuntimeError, match=r"interrupt\(\)"):
-        list(run(learner, arm, 0, movements=60))
-    learner.interrupt()
-    assert len(list(run(learner, arm, 0, movements=60))) == 44
+        list(run(learner, arm, 0, movements=60, teacher=teacher_of(other, 5)))
+    save_life(learner, tmp_path / "life.sqlite")
+    again, teacher = make("sgim-d", arm), teacher_of(other, 5)
+    load_life(again, tmp_path / "life.sqlite", teacher=teacher)
+    assert summary(list(run(again, arm, 0, movements=60, teacher=teacher))) == summary(whole[after:])
 
 
 def test_a_lesson_whose_answer_was_given_up_is_offered_again_and_such_a_life_can_be_loaded(tmp_path: Path) -> None:

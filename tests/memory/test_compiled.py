@@ -12,9 +12,10 @@ import sgimd_torch
 
 PROGRAM = """
 import numpy as np
-from sgimd_torch.memory.neighbours import Table, TreeNeighbours
-side = TreeNeighbours(Table(1)); side.keys.append(np.arange(5.0)[:, None])
-print(*side.nearest(np.array([3.2]), 2))
+from sgimd_torch.memory.neighbours import Neighbours
+from sgimd_torch.memory.table import Table
+side = Neighbours(Table(1, np.arange(5.0)[:, None]))
+print(*side.nearest(np.array([[3.2]]), 2)[0])
 """
 LIFE = """
 from sgimd_torch import practice, run

@@ -11,7 +11,6 @@ import pytest
 
 import bench
 import check_physics
-import make_demonstrations
 import mutants
 
 
@@ -25,12 +24,6 @@ def go(script, options):
 @pytest.mark.parametrize(
     ("script", "options"),
     [
-        (make_demonstrations, "--n -3"),
-        (make_demonstrations, "--n 11 --candidates 10"),
-        (make_demonstrations, "--n 10 --candidates 10"),  # some recordings land outside T
-        (make_demonstrations, "--candidates 0"),
-        (make_demonstrations, "--seed -1"),
-        (make_demonstrations, "--out nowhere/demonstrations.npz"),
         (mutants, "nowhere"),
         (mutants, "--commit nowhere"),
         (check_physics, "--movements 0"),
@@ -42,9 +35,8 @@ def go(script, options):
 )
 def test_what_makes_no_sense_is_refused_and_nothing_is_written(tmp_path, monkeypatch, capsys, script, options):
     monkeypatch.chdir(tmp_path)
-    out = {bench: "", check_physics: "", mutants: ""}.get(script, "--out out.npz ")
     with pytest.raises(SystemExit) as end:
-        go(script, out + options)
+        go(script, options)
     assert end.value.code == 2
     assert "error: " in capsys.readouterr().err
     assert not list(tmp_path.iterdir())

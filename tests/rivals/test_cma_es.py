@@ -40,11 +40,6 @@ def test_cma_es_writes_nothing_and_takes_no_orders(tmp_path, monkeypatch, capfd)
     assert capfd.readouterr() == ("", "")
 
 
-def test_cma_es_needs_covariances_to_adapt() -> None:
-    with pytest.raises(ValueError, match="2 dimensions or more"):
-        CmaEs(problem(policies=Box.cube(0, 1, 1)))
-
-
 def test_the_first_generation_spreads_by_sd_of_each_side_around_theta_of_the_estimate() -> None:
     policies, theta, n = Box(np.array([0.0, -100.0]), np.array([1.0, 100.0])), np.array([0.4, 6.0]), 200
     start = Estimate(theta, theta[None], np.zeros((1, 1)))
@@ -55,7 +50,14 @@ def test_the_first_generation_spreads_by_sd_of_each_side_around_theta_of_the_est
     assert varied.std(axis=0) / policies.sides == pytest.approx([0.02, 0.02], rel=5 / np.sqrt(2 * n))
 
 
-@pytest.mark.parametrize("options", [*({"sd": sd} for sd in (0.0, np.nan, np.inf)), {"population": 2}])
-def test_numbers_out_of_range_are_refused(options) -> None:
-    with pytest.raises(ValueError, match=next(iter(options))):
-        CmaEs(problem(), **options)
+@pytest.mark.parametrize(
+    ("dim", "options", "message"),
+    [
+        (1, {}, "2 dimensions or more"),
+        *((2, {"sd": sd}, "sd") for sd in (0.0, np.nan, np.inf)),
+        (2, {"population": 2}, "population"),
+    ],
+)
+def test_a_pi_or_numbers_out_of_range_are_refused(dim, options, message) -> None:
+    with pytest.raises(ValueError, match=message):
+        CmaEs(problem(policies=Box.cube(0, 1, dim)), **options)

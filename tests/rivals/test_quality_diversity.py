@@ -99,26 +99,34 @@ def test_policies_may_be_of_any_box_and_outcomes_outside_of_t(make):
     assert cells_reached(learner) in (1, 2)  # the second is of y = .5, all others share the corner
 
 
-@BOTH
-def test_what_makes_no_sense_is_refused(make):
-    for options, message in (
-        ({"sd": 0.0}, "sd must be positive"),
-        ({"batch": 0}, "batch must be"),
-        ({"cells": 0}, "cells must be"),
-        ({"cells": 2000}, "in all at most, got 2000 in 2 dimensions"),
-    ):
-        with pytest.raises(ValueError, match=message):
-            make(ARM, 0, **options)
-    with pytest.raises(ValueError, match="one context only, got contexts of dim 1"):
-        make(Elsewhere(ARM.policies, ARM.outcomes, Box.cube(0, 1, 1)), 0)
-    with pytest.raises(ValueError, match="rest of the environment must lie in"):
-        make(Elsewhere(ARM.policies, Box.cube(2, 3, 2), ARM.contexts), 0)
-    with pytest.raises(ValueError, match="must be a whole number"):
-        make(ARM, 0, **({"first": 0} if make in ELITES else {"emitters": 0}))
-    if make is cma_mae:
-        for rate in (0.0, 1.5, np.nan):
-            with pytest.raises(ValueError, match="learning_rate must"):
-                make(ARM, 0, learning_rate=rate)
+REFUSED = [
+    *((make, {"sd": 0.0}, "sd must be positive") for make in (*ELITES, *TEAMS)),
+    *((make, {"batch": 0}, "batch must be") for make in (*ELITES, *TEAMS)),
+    *((make, {"first": 0}, "first must be a whole number") for make in ELITES),
+    *((make, {"emitters": 0}, "emitters must be a whole number") for make in TEAMS),
+    *((cma_mae, {"learning_rate": rate}, "learning_rate must") for rate in (0.0, 1.5, np.nan)),
+    (map_elites, {"line": -0.1}, "line must be finite and >= 0"),
+    (map_elites, {"cells": 0}, "cells must be"),
+    (map_elites, {"cells": 2000}, "in all at most, got 2000 in 2 dimensions"),
+]
+
+
+@pytest.mark.parametrize(("make", "options", "message"), REFUSED)
+def test_options_that_make_no_sense_are_refused(make, options, message):
+    with pytest.raises(ValueError, match=message):
+        make(ARM, 0, **options)
+
+
+@pytest.mark.parametrize(
+    ("spaces", "message"),
+    [
+        ((ARM.policies, ARM.outcomes, Box.cube(0, 1, 1)), "one context only, got contexts of dim 1"),
+        ((ARM.policies, Box.cube(2, 3, 2), ARM.contexts), "rest of the environment must lie in"),
+    ],
+)
+def test_a_robot_with_contexts_or_a_wrong_rest_is_refused(spaces, message):
+    with pytest.raises(ValueError, match=message):
+        cma_me(Elsewhere(*spaces), 0)
 
 
 def test_movements_of_cma_mae_stay_compact():

@@ -172,11 +172,8 @@ def copy(tmp_path, undisturbed):
     ("damage", "message"),
     [
         ("UPDATE events SET outcome_0 = 0.5 WHERE movement = 40 AND kind = 'moved'", "of events is not what was"),
-        ("DELETE FROM events WHERE movement >= 70", "rows, .* were written"),
-        ("DELETE FROM demonstrations", "demonstrations has 0 rows"),
-        ("UPDATE errors SET error = 0 WHERE rowid = 1", "row 1 of errors"),
+        ("DELETE FROM regions WHERE rowid > 1", "regions has 1 rows, .* were written"),
         ("UPDATE about SET value = '[1]' WHERE name = 'settings'", "row 2 of about"),
-        (b"index,origin\n" * 300, "cannot be read as a record"),
         (bytes(8192), "cannot be read as a record"),
     ],
 )
@@ -185,7 +182,7 @@ def test_a_damaged_run_is_refused_and_left_as_it_is(tmp_path, copy, go, capsys, 
     before = files_of(copy)
     assert go(tmp_path, "--resume") == 2
     said = capsys.readouterr().err
-    assert re.search(rf"{message}.*sqlite3 run.sqlite .recover saves what can be read", said)
+    assert re.search(rf"{message}.*sqlite3 run.sqlite .recover prints what can be read", said)
     assert "Traceback" not in said
     assert files_of(copy) == before
 

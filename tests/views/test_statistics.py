@@ -42,16 +42,16 @@ def test_seeds_are_drawn_within_their_stratum(rng):
 
 
 def test_few_seeds_have_a_value_and_no_interval():
-    found = iqm_interval(np.full(4, 0.5), rng=statistics.rng())
+    found = iqm_interval(np.full(4, 0.5), rng=statistics.bootstrap_rng())
     assert (found.value, np.isnan(found.low), np.isnan(found.high)) == (0.5, True, True)
-    assert statistics.show(found) == "0.50"
+    assert statistics.interval_text(found) == "0.50"
 
 
 def test_each_number_draws_from_a_stream_of_its_own_and_is_told_with_its_interval():
     values = np.array([0.3, 0.4, 0.5, 0.6, 0.7])
-    found = iqm_interval(values, rng=statistics.rng())
-    assert found == iqm_interval(values, rng=statistics.rng())  # whatever was computed before
-    assert statistics.show(found, ".1f", "m") == f"0.5 [{found.low:.1f}, {found.high:.1f}] m"
+    found = iqm_interval(values, rng=statistics.bootstrap_rng())
+    assert found == iqm_interval(values, rng=statistics.bootstrap_rng())  # whatever was computed before
+    assert statistics.interval_text(found, ".1f", "m") == f"0.5 [{found.low:.1f}, {found.high:.1f}] m"
 
 
 def test_an_interval_holds_the_truth_about_as_often_as_it_says(rng, monkeypatch):

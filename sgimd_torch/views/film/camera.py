@@ -76,13 +76,13 @@ class Camera:
         for radius in (0.5, 1.0):
             draw_chain(scene, _circle(np.zeros(2), radius), 0, RING)
         for landing in shot.past[:: max(1, math.ceil(len(shot.past) / MOST_PAST))]:
-            draw(scene, mujoco.mjtGeom.mjGEOM_BOX, (0.007, 0.007, 0.001), np.append(landing, 0.001), PAST)
+            add_geom(scene, mujoco.mjtGeom.mjGEOM_BOX, (0.007, 0.007, 0.001), np.append(landing, 0.001), PAST)
         draw_chain(scene, _circle(shot.goal, 0.06), 0.008, GOAL)
         draw_chain(scene, [*(recording.float_at(t) for t in np.arange(0.0, time, 0.02)), float_at_time], 0, PATH)
         loose = recording.let_out is not None and time > recording.let_out
         hinges = [] if loose else self._data.xpos[self._line]
         draw_chain(scene, [self._data.site_xpos[self._tip], *hinges, float_at_time], 0.003, LINE)
-        draw(scene, mujoco.mjtGeom.mjGEOM_SPHERE, (0.026, 0, 0), float_at_time, FLOAT).emission = 0.4
+        add_geom(scene, mujoco.mjtGeom.mjGEOM_SPHERE, (0.026, 0, 0), float_at_time, FLOAT).emission = 0.4
         if time == recording.landed:
             draw_chain(scene, [np.append(shot.goal, 0.006), np.append(recording.outcome, 0.006)], 0.005, GOAL)
         return Image.fromarray(self._renderer.render())
@@ -124,10 +124,10 @@ def draw_chain(scene: mujoco.MjvScene, points: Sequence[Array] | Array, radius: 
     """Join points by rods of a ``radius`` (m); a radius of 0 draws lines, which is faster."""
     kind, width = (mujoco.mjtGeom.mjGEOM_CAPSULE, radius) if radius else (mujoco.mjtGeom.mjGEOM_LINE, 2)  # pixels
     for start, stop in pairwise(points):
-        mujoco.mjv_connector(draw(scene, kind, (width, 0, 0), start, colour), kind, width, start, stop)
+        mujoco.mjv_connector(add_geom(scene, kind, (width, 0, 0), start, colour), kind, width, start, stop)
 
 
-def draw(scene: mujoco.MjvScene, kind: int, size: Sequence[float], place: Array, colour: Colour) -> Any:
+def add_geom(scene: mujoco.MjvScene, kind: int, size: Sequence[float], place: Array, colour: Colour) -> Any:
     """Add a geom to the scene; MuJoCo defines the meaning of ``size`` (m) for each ``kind``."""
     geom = scene.geoms[scene.ngeom]
     mujoco.mjv_initGeom(geom, kind, np.array(size), place, np.eye(3).ravel(), np.array(colour, np.float32))

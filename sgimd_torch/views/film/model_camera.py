@@ -18,7 +18,7 @@ from PIL import Image
 
 from sgimd_torch.environments.mujoco_robot import Filmed, MujocoRobot
 from sgimd_torch.spaces import Array
-from sgimd_torch.views.film.camera import GOAL, MOST_PAST, PAST, draw, draw_chain, renderer_of
+from sgimd_torch.views.film.camera import GOAL, MOST_PAST, PAST, add_geom, draw_chain, renderer_of
 from sgimd_torch.views.film.reel import HEIGHT, WIDTH, Shot
 
 FILLED: Final = 0.8  # share of the picture, in height and width, that shows robot and T
@@ -77,12 +77,12 @@ class ModelCamera:
         for place in self._robot.located(shot.past[:: max(1, math.ceil(len(shot.past) / MOST_PAST))], start).reshape(
             -1, 3
         ):
-            draw(scene, BALL, (size / 3, 0, 0), place, PAST)
+            add_geom(scene, BALL, (size / 3, 0, 0), place, PAST)
         for k, goal in enumerate(self._robot.located(shot.goal[None], start)[0]):
             path = recording.path[: row + 1, k]
             draw_chain(scene, path, 0, PATH)
-            draw(scene, BALL, (1.6 * size, 0, 0), goal, (*GOAL[:3], 0.6)).emission = 0.4
-            draw(scene, BALL, (0.8 * size, 0, 0), path[-1], END).emission = 0.4
+            add_geom(scene, BALL, (1.6 * size, 0, 0), goal, (*GOAL[:3], 0.6)).emission = 0.4
+            add_geom(scene, BALL, (0.8 * size, 0, 0), path[-1], END).emission = 0.4
             if time >= recording.landed:
                 draw_chain(scene, [goal, path[-1]], 0.4 * size, GOAL)
         return Image.fromarray(self._renderer.render())

@@ -18,7 +18,7 @@ from sgimd_torch.record import RunError
 from sgimd_torch.runs.signals import parser_of
 from sgimd_torch.views.report import figures, provenance
 from sgimd_torch.views.results import results
-from sgimd_torch.views.statistics import LEAST_SEEDS, Interval, show
+from sgimd_torch.views.statistics import LEAST_SEEDS, Interval, interval_text
 from sgimd_torch.views.variants import Variant, baseline_of, best_first, compare, read_runs, unit_of
 
 EXAMPLES = """examples:
@@ -94,4 +94,4 @@ def page(place: Path, variants: Sequence[Variant], baseline: str | None = None) 
 
 def _interval(number: Interval | None, form: str = ".3f") -> str:
     """``0.060 [0.058, 0.062]``, or a dash for None."""
-    return "–" if number is None else show(number, form)
+    return "–" if number is None else interval_text(number, form)

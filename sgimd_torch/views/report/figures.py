@@ -21,7 +21,7 @@ from sgimd_torch.figures.axes import LEGEND, alike, limits, over_movements
 from sgimd_torch.figures.learning import COLOURS, interest_map, landing_points, map_after
 from sgimd_torch.figures.learning import misses as draw_misses
 from sgimd_torch.figures.save import STYLE as FILE_STYLE
-from sgimd_torch.figures.sections import Section, of_regions, sections
+from sgimd_torch.figures.sections import Section, sections, sections_of_regions
 from sgimd_torch.runs.read import Run
 from sgimd_torch.spaces import Array, Box, rounded
 from sgimd_torch.views.statistics import interquartile_mean
@@ -184,7 +184,7 @@ def regions(figure: Figure, run: Run) -> None:
     """The regions of T at the last evaluation, coloured by interest, with the latest goals."""
     assert run.regions is not None
     lows, highs, interests = map_after(run.regions, run.regions["movements"].max())
-    panels = of_regions(lows, highs, run.spaces["outcomes"])
+    panels = sections_of_regions(lows, highs, run.spaces["outcomes"])
     for ax, section in zip(_panels(figure, panels), panels, strict=True):
         interest_map(ax, lows, highs, interests, section, goals=run.chosen_goals()[-GOALS:])
 

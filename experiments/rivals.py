@@ -1,12 +1,14 @@
-"""Goal babbling from a home posture, a rival: Rolf, Steil & Gienger (2010), "Goal babbling permits direct learning of
-inverse kinematics", IEEE Transactions on Autonomous Mental Development 2(3).
+"""Two rivals: goal babbling from a home posture, and MAP-Elites that begins in the middle of Pi.
+
+Goal babbling: Rolf, Steil & Gienger (2010), "Goal babbling permits direct learning of inverse kinematics", IEEE
+Transactions on Autonomous Mental Development 2(3).
 
 At first the learner knows one movement, home, which is the middle of Pi. Goals lie on straight paths through T. For
 each goal the learner makes the movement that its estimate gives, plus a variation. The variation is an affine function
 of the goal, drawn once for each path. The estimate learns from these movements alone. A movement gets a larger weight
 if its outcome moved towards the goal, and farther relative to the change of theta. So the estimate learns one of the
 many families of movements that reach a place.
-    sgimd run --algorithm experiments.home_babbling:home_babbling
+    sgimd run --algorithm experiments.rivals:home_babbling
 Deviation: the estimate is a local affine regression, not a global one. Theta takes the place of the posture.
 """
 
@@ -15,11 +17,14 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
+from ribs.archives import GridArchive
+from ribs.emitters import GaussianEmitter
 
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Learner
 from sgimd_torch.parts import Problem, Strategy
+from sgimd_torch.rivals import quality_diversity
 from sgimd_torch.spaces import Array, Attempt, Move
 
 HOMEWARD: Final = 0.1  # share of paths that begin with the movement home
@@ -108,3 +113,16 @@ def home_babbling(environment: Environment, seed: int, *, steps: int = 10, sd: f
         raise ValueError(f"home babbling knows one context only, got contexts of dim {environment.contexts.dim}")
     problem = Problem(environment, seed, inverse=LocalProcess)
     return Learner(problem, HomeBabbling(problem, steps=steps, sd=sd))
+
+
+def map_elites_middle(environment: Environment, seed: int) -> Learner:
+    """MAP-Elites that begins around the middle of Pi, with wider variations, and with cells of twice the side."""
+
+    def emitters(archive: GridArchive, rng: np.random.Generator) -> list[GaussianEmitter]:
+        dim = environment.policies.dim
+        bounds = {"lower_bounds": np.zeros(dim), "upper_bounds": np.ones(dim)}
+        first = rng.normal(0.5, 0.1, (100, dim)).clip(0, 1)
+        drawn = int(rng.integers(2**32))
+        return [GaussianEmitter(archive, sigma=0.1, initial_solutions=first, batch_size=10, seed=drawn, **bounds)]
+
+    return quality_diversity.quality_diversity(environment, seed, "map-elites", emitters, {}, cells=10)

@@ -1,11 +1,11 @@
-"""Goal babbling from home: it begins in the middle, and what it learns is one family of movements."""
+"""Rivals: goal babbling from home, which learns one family of movements, and MAP-Elites that begins in the middle."""
 
 from functools import partial
 
 import numpy as np
 import pytest
 
-from home_babbling import home_babbling
+from rivals import home_babbling, map_elites_middle
 from sgimd_torch import PlanarArm, random_exploration, run
 from sgimd_torch.spaces import stream
 from toys import toss
@@ -46,3 +46,12 @@ def test_a_seed_makes_the_same_life_and_another_seed_another():
 def test_contexts_are_refused():
     with pytest.raises(ValueError, match="one context only, got contexts of dim"):
         home_babbling(toss().environment, 0)
+
+
+def test_map_elites_may_begin_around_the_middle_and_goes_on_from_its_elites():
+    learner = map_elites_middle(ARM, 0)
+    thetas = np.array([episode.move.theta for episode in run(learner, ARM, 0, movements=150)])
+    assert thetas[:100].std() == pytest.approx(0.1, rel=0.1)
+    assert abs(thetas[:100].mean() - 0.5) < 0.02
+    away = np.abs(thetas[100:, None] - thetas[:100]).max(axis=2).min(axis=1)
+    assert np.median(away) < 0.35  # of a movement from the nearest first one

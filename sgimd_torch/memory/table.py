@@ -1,0 +1,49 @@
+"""A table that grows by rows."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from sgimd_torch.spaces import Array
+
+
+class Table:
+    """Rows in an array that doubles its size when full."""
+
+    def __init__(self, dim: int, rows: Array | None = None) -> None:
+        self._room = np.empty((64, dim))
+        self._rows: Array | None = None
+        self._n = 0
+        if rows is not None:
+            self.append(rows)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Table, (self.dim, self.rows)
+
+    def __len__(self) -> int:
+        return self._n
+
+    @property
+    def dim(self) -> int:
+        """Number of columns."""
+        return self._room.shape[1]
+
+    @property
+    def rows(self) -> Array:
+        """``(n, dim)`` read-only; rows that are added later do not appear in it."""
+        if self._rows is None:
+            self._rows = self._room[: self._n]
+            self._rows.flags.writeable = False
+        return self._rows
+
+    def append(self, rows: Array) -> None:
+        """Add ``(m, dim)`` rows."""
+        n_old, n_new = self._n, self._n + len(rows)
+        if n_new > len(self._room):
+            room = np.empty((max(n_new, 2 * len(self._room)), self.dim))
+            room[:n_old] = self._room[:n_old]
+            self._room = room
+        self._room[n_old:n_new] = rows
+        self._rows, self._n = None, n_new

@@ -1,0 +1,239 @@
+"""Explorers, and the exemplars with an effect from which `Returning` and `AmongEffects` learn."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+
+from experiments.toys import crawler, fetch, puck, toss, toy_benchmark, two_elbows
+from sgimd_torch.algorithms.practice import practice
+from sgimd_torch.environments.fishing_rod import FishingRod
+from sgimd_torch.evaluation import evaluate
+from sgimd_torch.inverses.among_effects import AmongEffects
+from sgimd_torch.inverses.local_process import LocalProcess
+from sgimd_torch.inverses.nearest import NearestNeighbour
+from sgimd_torch.memory import Memory
+from sgimd_torch.options.catalogue import WORDS
+from sgimd_torch.searches.effects import Effects
+from sgimd_torch.searches.explore import Returning, Widening
+from sgimd_torch.session import run
+from sgimd_torch.spaces import Box, Estimate
+from worlds import NO_CONTEXT, part, problem
+
+POLICIES = Box(np.array([-1.0, 0.0]), np.array([3.0, 10.0]))
+
+
+class Oracle(NearestNeighbour):
+    """Expects theta itself, plus an error."""
+
+    def __init__(self, problem, *, error: float = 0.0) -> None:
+        super().__init__(problem)
+        self.error = error
+
+    def predict(self, context, theta):
+        return theta + self.error
+
+
+def explored(make, inverse, movements, *, told=True, seed=0):
+    """An explorer and its ``movements``; ``told``: whether their outcomes, theta itself, come into the memory."""
+    space = problem(policies=POLICIES, inverse=inverse, seed=seed)
+    explore, thetas = make(space), []
+    for _ in range(movements):
+        thetas.append(explore(NO_CONTEXT))
+        if told:
+            space.memory.add(NO_CONTEXT, thetas[-1], thetas[-1])
+    return explore, np.array(thetas)
+
+
+@pytest.mark.parametrize("word", WORDS["explore"])
+def test_movements_lie_in_pi_and_come_from_the_stream_alone(word):
+    first, same, other = (explored(part("explore", word), Oracle, 60, seed=seed)[1] for seed in (1, 1, 2))
+    assert POLICIES.contains(first).all()
+    assert np.array_equal(first, same)
+    assert not np.isclose(first, other).all(axis=1).any()
+
+
+def test_widening_begins_around_the_middle():
+    _, thetas = explored(Widening, NearestNeighbour, 4000)
+    assert thetas.mean(axis=0) == pytest.approx([1.0, 5.0], abs=0.05)
+    assert thetas.std(axis=0) / POLICIES.sides == pytest.approx([0.1, 0.1], rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("error", "told", "width"),
+    [(0.0, True, 0.3), (100.0, True, 0.03), (0.0, False, 0.1)],
+    ids=["good predictions widen", "bad ones narrow", "movements without an outcome say nothing"],
+)
+def test_the_width_follows_predictions(error, told, width):
+    explore, thetas = explored(Widening, partial(Oracle, error=error), 90, told=told)
+    assert explore.width.sd == width
+    assert thetas[30:].std(axis=0) / POLICIES.sides == pytest.approx([width, width], rel=0.35)  # clipped to Pi
+
+
+@pytest.mark.parametrize(
+    ("make", "least", "most"), [(lambda: two_elbows().environment, 0.25, 0.3), (FishingRod, 0.03, 0.25)]
+)
+def test_exploration_is_wide_if_movements_are_alike_and_narrow_if_they_are_not(make, least, most):
+    robot = make()
+    learner = practice(robot, 0)
+    for _ in run(learner, robot, 0, movements=150):
+        pass
+    assert least <= learner.autonomous.wide.explore.width.sd <= most
+
+
+def test_around_a_copied_movement_a_search_is_half_as_wide_as_exploration():
+    babbling, known = practice(two_elbows().environment, 0).autonomous.wide, np.full((1, 3), 0.5)
+    babbling.explore.width.sd = 0.06
+    search = babbling.search(Estimate(known[0], known, np.zeros((1, 2))), np.zeros(2))
+    executed = np.array([next(search), *(search.send(np.zeros(2)) for _ in range(1999))])
+    assert executed.std(axis=0) == pytest.approx(np.full(3, 0.03), rel=5 / 63)  # five standard errors
+
+
+@pytest.mark.parametrize(
+    ("inverse", "reasons"),
+    [
+        (NearestNeighbour, ["NearestNeighbour predicts nothing", "NearestNeighbour does not report them"]),
+        (LocalProcess, ["LocalProcess does not report them"]),
+        (AmongEffects, []),
+    ],
+)
+def test_what_an_inverse_model_does_not_tell_exploration_is_remarked(inverse, reasons):
+    space = problem(inverse=inverse)
+    Returning(space)
+    assert [remark.partition(": ")[2] for remark in space.remarks] == reasons
+
+
+def lived(robot, movements, seed=0):
+    """A memory of uniform movements."""
+    rng, memory = np.random.default_rng(seed), Memory(robot.contexts.dim, robot.policies.dim, robot.outcomes.dim)
+    for _ in range(movements):
+        context, theta = robot.observe(rng), robot.policies.sample(rng)
+        memory.add(context, theta, robot.execute(context, theta, rng))
+    return memory
+
+
+def presses(n, *, noise=0.0, unit=1.0, pressed=0.25, memory=None):
+    """A memory of ``n`` movements; theta[0] below ``pressed`` moves an object that lies at -3 c + 1."""
+    rng, memory = np.random.default_rng(0), Memory(1, 3, 1) if memory is None else memory
+    for _ in range(n):
+        context, theta = rng.uniform(-1, 1, size=1), rng.uniform(size=3)
+        outcome = 1 - 3 * context + (theta[0] < pressed) * (0.1 + theta[1])
+        memory.add(context, theta, unit * rng.normal(outcome, noise))
+    return memory
+
+
+def returning(memory):
+    return Returning(problem(memory=memory, inverse=AmongEffects))
+
+
+@pytest.mark.parametrize(("noise", "unit"), [(0.0, 1.0), (0.01, 1.0), (0.01, 1000.0), (0.0, 1e-4)])
+def test_movements_with_an_effect_are_told_from_those_without_in_any_unit(noise, unit):
+    whole, memory = presses(400, noise=noise, unit=unit), Memory(1, 3, 1)
+    effects = Effects(memory, noise * unit)
+    for exemplar in zip(whole.contexts, whole.thetas, whole.outcomes, strict=True):
+        memory.add(*exemplar)
+        acted = effects()
+    pressed = memory.thetas[:, 0] < 0.25
+    assert np.array_equal(acted.thetas, memory.thetas[pressed])
+    assert np.array_equal(acted.outcomes, memory.outcomes[pressed])
+    assert len(Effects(presses(50, noise=0.01, pressed=0.0), 0.01)()) == 0  # no movement has had an effect yet
+
+
+@pytest.mark.parametrize("make", [toss, two_elbows, crawler])
+def test_where_each_movement_has_its_own_effect_there_is_no_plateau(make):
+    robot = make().environment
+    memory, whole = lived(robot, 0), lived(robot, 300)
+    effects = Effects(memory, robot.outcome_noise)
+    for exemplar in zip(whole.contexts, whole.thetas, whole.outcomes, strict=True):
+        memory.add(*exemplar)
+        assert effects() is None
+
+
+@pytest.mark.parametrize("make", [puck, fetch])
+def test_touches_of_an_object_are_found(make):
+    robot = make().environment
+    memory = lived(robot, 1000)
+    acted = Effects(memory, robot.outcome_noise)()
+    moved = np.linalg.norm(memory.outcomes - (memory.contexts if robot.contexts.dim else robot.rest), axis=1) > 0.06
+    assert {tuple(theta) for theta in memory.thetas[moved]} <= {tuple(theta) for theta in acted.thetas}
+    assert moved.sum() <= len(acted) < 0.25 * 1000
+
+
+def test_the_answer_is_learnt_from_movements_with_an_effect():
+    inverse, goals = AmongEffects(problem(memory=presses(400))), np.linspace(1.2, 2, 20)
+    thetas = np.array([inverse(np.zeros(1), np.array([goal])).theta for goal in goals])
+    assert (thetas[:, 0] < 0.25).all()
+    assert np.abs(1.1 + thetas[:, 1] - goals).mean() < 0.02
+
+
+def test_without_a_plateau_answers_and_exploration_are_the_usual_ones():
+    robot = two_elbows().environment
+    memory = lived(robot, 200)
+    ours, usual = (problem(robot, memory=memory, inverse=make) for make in (AmongEffects, LocalProcess))
+    goal = np.array([0.3, 0.4])
+    assert np.array_equal(ours.inverse(NO_CONTEXT, goal).theta, usual.inverse(NO_CONTEXT, goal).theta)
+    explore, widening = Returning(ours), Widening(usual)
+    assert explore.share is None
+    for _ in range(20):
+        theta = explore(NO_CONTEXT)
+        assert np.array_equal(theta, widening(NO_CONTEXT))
+        memory.add(NO_CONTEXT, theta, robot.execute(NO_CONTEXT, theta, np.random.default_rng(2)))
+
+
+def test_returning_is_uniform_until_a_movement_has_an_effect_and_then_half_around_this_movement():
+    memory = presses(50, pressed=0.0)
+    explore = returning(memory)
+    assert explore.share == 1.0
+    anywhere = np.array([explore(np.zeros(1)) for _ in range(200)])
+    assert anywhere.std(axis=0) == pytest.approx(np.full(3, np.sqrt(1 / 12)), rel=0.15)
+    memory.add(np.zeros(1), np.array([0.1, 0.9, 0.5]), np.array([2.0]))
+    around = np.array([explore(np.zeros(1)) for _ in range(200)])
+    assert (np.abs(around - [0.1, 0.9, 0.5]).max(axis=1) < 0.25).mean() == pytest.approx(0.5, abs=0.15)
+    presses(200, memory=memory)
+    assert explore.share == 0.1  # enough effects to learn from
+
+
+def test_returning_varies_movements_of_similar_contexts():
+    memory = presses(400)
+    for side in (-1.0, 1.0):
+        for row in range(20):
+            memory.add([side], [0.1, (1 + side) / 2, row / 20], [1 - 3 * side + 0.1 + (1 + side) / 2])
+    explore = returning(memory)
+    for side in (-1.0, 1.0):
+        thetas = np.array([explore(np.array([side])) for _ in range(200)])[:, 1]
+        assert 0.35 < (np.abs(thetas - (1 + side) / 2) < 0.15).mean() < 0.65  # half of them, and .15 of the others
+
+
+def test_variations_are_wider_the_more_often_the_effect_persists():
+    rng, widths = np.random.default_rng(0), []
+    for persists in (True, False):
+        memory = Memory(0, 3, 1)
+        explore = returning(memory)
+        for row in range(40):
+            memory.add([], rng.uniform(size=3), [0.0 if row else 1.0])
+        for _ in range(30):
+            memory.add([], explore(NO_CONTEXT), [rng.uniform(1, 2) if persists else 0.0])
+        widths.append(explore.width.sd)
+    assert widths[0] > 5 * widths[1]
+
+
+def test_practice_fetches_a_ball_that_it_would_not_have_found_around_the_middle():
+    robot, errors = fetch().environment, []
+    goals = toy_benchmark(robot, 0.1).goals[::4]
+    for parts in ({}, {"inverse": LocalProcess, "explore": Widening}):
+        learner = practice(robot, 1, **parts)
+        for _ in run(learner, robot, 1, movements=400):
+            pass
+        errors.append(evaluate(learner.inverse, robot, goals, 1, 400, repeats=0).mean_error)
+    assert errors[0] < 0.3 * errors[1]
+
+
+@pytest.mark.parametrize(("first", "uniform"), [(30, True), (0, False)])
+def test_exploration_begins_with_uniform_movements_or_around_the_middle(first, uniform):
+    robot = crawler().environment
+    learner = practice(robot, 0, explore=partial(Returning, first=first))
+    origins = [episode.move.origin for episode in run(learner, robot, 0, movements=120)]
+    assert origins[:first] == ["global"] * first
+    assert origins[30:].count("global") < 60
+    wide = learner.memory.thetas[:30].std(axis=0) > 0.2 * robot.policies.sides  # .29 if uniform, .1 around the middle
+    assert (wide == uniform).all()
