@@ -1,4 +1,4 @@
-"""A robot that changes: the learner notices it, and what was learnt before counts only as far as it still holds.
+"""A robot that changes: the learner notices it, and earlier exemplars are kept if they improve predictions now.
 
 Our addition. When a change is noticed, the learner begins again: it is built anew by the function that has built it.
 The memory of its problem then holds all movements since the change, and those of before that help to predict them, as
@@ -19,7 +19,7 @@ from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, stream
 
 if TYPE_CHECKING:
-    from sgimd_torch.changes.notice import Notice
+    from sgimd_torch.changes.detector import ChangeDetector
 
 _FIRST: Final = 32  # exemplars before any movement is predicted
 
@@ -72,7 +72,7 @@ class Watcher:
 
     def __init__(self, begin: Begin, learner: Learner, prior: Memory | None) -> None:
         self._begin, self._learner, self.prior, self._seed = begin, learner, prior, learner.problem.seed
-        self._notice: Notice | None = None
+        self._detector: ChangeDetector | None = None
         self._inverse, self._process = learner.inverse, process_of(learner.inverse)
         if prior is not None:
             learner.memory, learner.begun = Memory(*learner.problem.dims), 0
@@ -91,24 +91,24 @@ class Watcher:
         self._numbers.append(max(0, learner.movements - 1))
         if self.prior is None and len(process.memory) < _FIRST:
             return
-        if self._notice is None:
-            from sgimd_torch.changes.notice import Notice  # the first movements of a life do not need it
+        if self._detector is None:
+            from sgimd_torch.changes.detector import ChangeDetector  # the first movements of a life do not need it
 
-            self._notice = Notice(learner.problem, learner.memory, self.prior)
-        self._notice.expect(process, context, theta, outcome)
+            self._detector = ChangeDetector(learner.problem, learner.memory, self.prior)
+        self._detector.expect(process, context, theta, outcome)
 
     def restart_if_changed(self) -> tuple[Learner, Change | None] | None:
         """A learner to go on as, and the change if a new one was noticed; None to go on."""
         learner = self._learner
-        if self._notice is None:
+        if self._detector is None:
             return None
-        found = self._notice.look(self.process)
-        if found is None:
+        restart = self._detector.restart_if_changed(self.process)
+        if restart is None:
             return None
         n = len(learner.memory)
         seed = int(stream(self._seed, "begin again", n).integers(2**63))
-        new = self._begin(seed, found.exemplars.memory)
-        if not found.new:
+        new = self._begin(seed, restart.exemplars.memory)
+        if not restart.is_new:
             return new, None
-        since = self._numbers[self._notice.since]
-        return new, Change(since, learner.movements, found.before, found.kept)
+        since = self._numbers[self._detector.since]
+        return new, Change(since, learner.movements, restart.n_before, restart.n_kept)

@@ -4,32 +4,34 @@ from __future__ import annotations
 
 import numpy as np
 
-from sgimd_torch.inverses.kernels import covariances, expected, fitted, unknown
+from sgimd_torch.inverses.kernels import covariances, expected, fitted_process, unknown
 from sgimd_torch.memory.jit import LISTS, NUMBERS, TABLE, columns, compiled_for
 from sgimd_torch.spaces import Array
 
 
 @compiled_for(TABLE, TABLE, LISTS, TABLE, NUMBERS)
-def predict(inputs: Array, outcomes: Array, near: np.ndarray, here: Array, kernel: Array) -> tuple[Array, Array, Array]:
+def predict(
+    inputs: Array, outcomes: Array, near: np.ndarray, points: Array, kernel: Array
+) -> tuple[Array, Array, Array]:
     """Expected outcomes ``(n, outcome_dim)`` of movements, their variances ``(n,)``, noise included, and the slopes of
     the outcomes by the inputs, ``(n, outcome_dim, dim)``.
 
     Args:
         inputs, outcomes: ``(rows, dim)``, in lengths, and ``(rows, outcome_dim)``, exemplars.
         near: ``(n, k)``, rows of the exemplars from which each movement is predicted.
-        here: ``(n, dim)``, the movements in lengths.
-        kernel: ``(4,)``, see `Process`.
+        points: ``(n, dim)``, the movements in lengths.
+        kernel: ``(4,)``, see `GaussianProcess`.
     """
-    n, m, dim = len(here), outcomes.shape[1], here.shape[1]
-    found, variances, slopes = np.empty((n, m)), np.empty(n), np.empty((n, m, dim))
+    n, m, dim = len(points), outcomes.shape[1], points.shape[1]
+    predictions, variances, slopes = np.empty((n, m)), np.empty(n), np.empty((n, m, dim))
     covariance, slope = np.empty(near.shape[1]), np.empty(near.shape[1])
     for i in range(n):
-        rows, point = near[i].copy(), here[i].copy()
-        process = fitted(columns(inputs, rows), columns(outcomes, rows), kernel)
+        rows, point = near[i].copy(), points[i].copy()
+        process = fitted_process(columns(inputs, rows), columns(outcomes, rows), kernel)
         covariances(process.inputs, kernel, point, covariance, slope)
-        found[i] = expected(process, covariance)
+        predictions[i] = expected(process, covariance)
         variances[i] = unknown(process, covariance) + process.variance * kernel[3]
         for k in range(m):
             pull = process.weights[k] * slope
             slopes[i, k] = point * pull.sum() - process.inputs @ pull
-    return found, variances, slopes
+    return predictions, variances, slopes

@@ -23,7 +23,6 @@ from sgimd_torch.spaces import Array
 
 _BLAS: Final = ThreadpoolController()
 _LEAST: Final = 1e-6  # least noise variance, relative to the kernel's; with less noise the matrix would be singular
-_TINY: Final = 1e-300
 _NOISES: Final = (_LEAST, 1e-4, 1e-3, 1e-2, 0.03, 0.1, 0.3, 1.0, 3.0)
 _SCALES: Final = (0.5, 1.0, 2.0)
 _ROUGH: Final = ((1.0, 0.0), *itertools.product((4.0, 12.0), (0.03, 0.1, 0.3, 0.6)))  # (finer, share)
@@ -38,8 +37,8 @@ Output = TypeVar("Output")
 def one_thread(function: Callable[Inputs, Output]) -> Callable[Inputs, Output]:
     """Decorator: linear algebra in one thread. For these small matrices several threads are slower: on two cores a run
     of `practice` would take twice as long, on sixteen far longer."""
-    found: Callable[Inputs, Output] = _BLAS.wrap(limits=1, user_api="blas")(function)
-    return found
+    limited: Callable[Inputs, Output] = _BLAS.wrap(limits=1, user_api="blas")(function)
+    return limited
 
 
 class Kernel(NamedTuple):
@@ -81,15 +80,15 @@ def fit_lengths(inputs: Array, outcomes: Array) -> Array:
         inverse, _ = dpotri(factor, lower=False, overwrite_c=True)
         variance = (deviations * weights).mean()
         by_lengths, by_noise = kernels.gradient(scaled, inverse.T, np.ascontiguousarray(weights.T), slopes, variance)
-        off = (parameters[:dim] - guess) / 1.5
+        deviation = (parameters[:dim] - guess) / 1.5
         likelihood = 0.5 * deviations.size * np.log(variance) + deviations.shape[1] * logs
-        value = float(likelihood + 0.5 * (off * off).sum())
-        return value, np.append(by_lengths + off / 1.5, noise * by_noise)
+        value = float(likelihood + 0.5 * (deviation * deviation).sum())
+        return value, np.append(by_lengths + deviation / 1.5, noise * by_noise)
 
     bounds = [(guess - 5, guess + np.log(2))] * dim + [(np.log(_LEAST), np.log(3))]
     start = np.append(np.full(dim, guess), np.log(0.05))
-    found = minimize(loss, start, jac=True, method="L-BFGS-B", bounds=bounds, options={"maxiter": _STEPS})
-    return np.exp(found.x[:dim])
+    fit = minimize(loss, start, jac=True, method="L-BFGS-B", bounds=bounds, options={"maxiter": _STEPS})
+    return np.exp(fit.x[:dim])
 
 
 def choose_kernel(groups: Sequence[tuple[Array, Array]], noise: float) -> Kernel:
@@ -113,6 +112,6 @@ def choose_kernel(groups: Sequence[tuple[Array, Array]], noise: float) -> Kernel
             others, _, _ = dormqr("L", "T", below[1:, :-1], lengths, deviations[1:], 64 * deviations.shape[1])
             turned = np.concatenate((deviations[:1], others)).T.copy()
             row += kernels.scores(diagonal, beside, turned, noises, float(noise))
-    kernel, found = np.unravel_index(scores.argmax(), scores.shape)
+    kernel, best_noise = np.unravel_index(scores.argmax(), scores.shape)
     scale, finer, share, _ = grid[kernel].tolist()
-    return Kernel(scale, finer, share, float(noises[found]))
+    return Kernel(scale, finer, share, float(noises[best_noise]))

@@ -26,7 +26,7 @@ LOG2_HIGH, LOG2_LOW = 0.693147180369123816, 1.90821492927058770e-10  # sum to lo
 TERMS: Final = tuple(1 / math.factorial(k) for k in range(13, 0, -1))  # of the series of e^r, all but 1
 
 
-class Process(NamedTuple):
+class GaussianProcess(NamedTuple):
     """Gaussian process, given some movements.
 
     Attributes:
@@ -90,10 +90,10 @@ def correlations(inputs: Array, kernel: Array) -> tuple[Array, Array]:
     """Covariance matrix ``(n, n)`` of ``inputs`` ``(dim, n)``, without noise, and its slopes, see `covariances`; the
     lower halves alone."""
     n = inputs.shape[1]
-    found, slopes = np.zeros((n, n)), np.empty((n, n))
+    covariance, slopes = np.zeros((n, n)), np.empty((n, n))
     for i in range(n):
-        covariances(inputs, kernel, inputs[:, i].copy(), found[i, : i + 1], slopes[i, : i + 1])
-    return found, slopes
+        covariances(inputs, kernel, inputs[:, i].copy(), covariance[i, : i + 1], slopes[i, : i + 1])
+    return covariance, slopes
 
 
 @inner
@@ -116,7 +116,7 @@ def solve_transposed(lower: Array, b: Array) -> None:
 
 
 @inner
-def fitted(inputs: Array, outcomes: Array, kernel: Array) -> Process:
+def fitted_process(inputs: Array, outcomes: Array, kernel: Array) -> GaussianProcess:
     """The process of movements with ``inputs`` ``(dim, n)`` and ``outcomes`` ``(outcome_dim, n)``."""
     m, n = outcomes.shape
     covariance, _ = correlations(inputs, kernel)
@@ -130,22 +130,22 @@ def fitted(inputs: Array, outcomes: Array, kernel: Array) -> Process:
         solve_lower(factor, weights[k])
         total += weights[k] @ weights[k]
         solve_transposed(factor, weights[k])
-    return Process(inputs, kernel, factor, weights, mean, max(total / (n * m), TINY))
+    return GaussianProcess(inputs, kernel, factor, weights, mean, max(total / (n * m), TINY))
 
 
 @inner
 def precisions(factor: Array, last: int) -> Array:
     """Diagonal of the inverse covariance for the ``last`` movements, which need the last corner of the factor alone."""
     first = len(factor) - last
-    root, found = np.linalg.inv(factor[first:, first:].copy()), np.zeros(last)
+    root, diagonal = np.linalg.inv(factor[first:, first:].copy()), np.zeros(last)
     for j in range(last):
         for i in range(j, last):
-            found[j] += root[i, j] ** 2
-    return found
+            diagonal[j] += root[i, j] ** 2
+    return diagonal
 
 
 @inner
-def unknown(process: Process, covariance: Array) -> float:
+def unknown(process: GaussianProcess, covariance: Array) -> float:
     """Variance of the outcome of a point that has this ``covariance`` with the inputs, without noise."""
     known = covariance.copy()
     solve_lower(process.factor, known)
@@ -153,72 +153,79 @@ def unknown(process: Process, covariance: Array) -> float:
 
 
 @inner
-def expected(process: Process, covariance: Array) -> Array:
+def expected(process: GaussianProcess, covariance: Array) -> Array:
     """Expected outcome of a point that has this ``covariance`` with the inputs."""
     return process.weights @ covariance + process.mean
 
 
 @inner
-def prediction(process: Process, here: Array) -> tuple[Array, float]:
-    """Expected outcome of a movement with the input ``here`` ``(dim,)``, and its variance, without noise."""
+def prediction(process: GaussianProcess, point: Array) -> tuple[Array, float]:
+    """Expected outcome of a movement with the input ``point`` ``(dim,)``, and its variance, without noise."""
     covariance, slope = np.empty(process.inputs.shape[1]), np.empty(process.inputs.shape[1])
-    covariances(process.inputs, process.kernel, here, covariance, slope)
+    covariances(process.inputs, process.kernel, point, covariance, slope)
     return expected(process, covariance), unknown(process, covariance)
 
 
 @inner
-def expected_error(process: Process, goal: Array, doubt: float, covariance: Array, limit: float) -> float:
-    """Expected squared error, the variance times ``doubt`` included; any number above ``limit`` if it is larger."""
+def expected_error(process: GaussianProcess, goal: Array, inflation: float, covariance: Array, limit: float) -> float:
+    """Expected squared error, the variance times ``inflation`` included; any number above ``limit`` if it is larger."""
     error = squared_distance(expected(process, covariance), goal)
-    return error if error >= limit else error + doubt * unknown(process, covariance)
+    return error if error >= limit else error + inflation * unknown(process, covariance)
 
 
 @inner
 def in_lengths(theta: Array, context: Array, units: Array) -> Array:
     """Input ``(dim,)`` of the process; ``units``: ``(2, dim)``, origin and size of a length."""
-    found, t = np.empty(units.shape[1]), len(theta)
-    for k in range(len(found)):
-        found[k] = ((theta[k] if k < t else context[k - t]) - units[0, k]) / units[1, k]
-    return found
+    point, t = np.empty(units.shape[1]), len(theta)
+    for k in range(len(point)):
+        point[k] = ((theta[k] if k < t else context[k - t]) - units[0, k]) / units[1, k]
+    return point
 
 
 @inner
 def descend(
-    process: Process, start: Array, context: Array, goal: Array, doubt: float, units: Array, spreads: Array, box: Array
+    process: GaussianProcess,
+    start: Array,
+    context: Array,
+    goal: Array,
+    inflation: float,
+    units: Array,
+    spreads: Array,
+    box: Array,
 ) -> tuple[float, Array]:
     """Least expected squared error, and its theta, after damped Gauss-Newton steps from ``start`` ``(theta_dim,)``.
     Steps end when they do not help; each is as short as possible, so unimportant parameters hardly change."""
     n, t, m = process.inputs.shape[1], len(start), len(goal)
-    least, found = np.inf, start
+    least, best = np.inf, start
     covariance, slope = np.empty((1 + len(DAMPINGS), n)), np.empty((1 + len(DAMPINGS), n))
     tried, jacobian = np.empty((len(DAMPINGS), t)), np.empty((m, t))
-    covariances(process.inputs, process.kernel, in_lengths(found, context, units), covariance[0], slope[0])
+    covariances(process.inputs, process.kernel, in_lengths(best, context, units), covariance[0], slope[0])
     for _ in range(STEPS):
-        here = in_lengths(found, context, units)
+        point = in_lengths(best, context, units)
         for k in range(m):
             pull = process.weights[k] * slope[0]
             back = process.inputs @ pull
             for i in range(t):
-                jacobian[k, i] = (here[i] * pull.sum() - back[i]) * spreads[i] / units[1, i]
+                jacobian[k, i] = (point[i] * pull.sum() - back[i]) * spreads[i] / units[1, i]
         ahead, squares = goal - expected(process, covariance[0]), jacobian @ jacobian.T
         size, better = np.trace(squares) / m + TINY, 0
         for d in range(len(DAMPINGS)):
             step = np.linalg.solve(squares + size * DAMPINGS[d] * np.eye(m), ahead) @ jacobian
             for i in range(t):
-                tried[d, i] = min(max(found[i] + spreads[i] * step[i], box[0, i]), box[1, i])
-            here = in_lengths(tried[d], context, units)
-            covariances(process.inputs, process.kernel, here, covariance[1 + d], slope[1 + d])
-            error = expected_error(process, goal, doubt, covariance[1 + d], least)
+                tried[d, i] = min(max(best[i] + spreads[i] * step[i], box[0, i]), box[1, i])
+            point = in_lengths(tried[d], context, units)
+            covariances(process.inputs, process.kernel, point, covariance[1 + d], slope[1 + d])
+            error = expected_error(process, goal, inflation, covariance[1 + d], least)
             if error < least:
                 least, better = error, 1 + d
         if not better:
             break
-        found, covariance[0], slope[0] = tried[better - 1].copy(), covariance[better], slope[better]
-    return least, found
+        best, covariance[0], slope[0] = tried[better - 1].copy(), covariance[better], slope[better]
+    return least, best
 
 
 @inner
-def learnt_from(near: np.ndarray, alike: np.ndarray, n: int) -> np.ndarray:
+def rows_to_fit(near: np.ndarray, alike: np.ndarray, n: int) -> np.ndarray:
     """Rows that a process is fitted to: those of ``alike``, which are nearest first in each list, by turns, and at the
     end those ``near`` the goal."""
     rows, new = np.empty(alike.shape[1], np.int64), np.ones(n, np.bool_)
@@ -257,15 +264,15 @@ def answer(
         inputs: ``(n, dim)``, all movements in lengths.
         thetas, outcomes: ``(n, theta_dim)`` and ``(n, outcome_dim)``, all movements in memory.
         context, goal: question.
-        kernel: ``(4,)``, see `Process`.
+        kernel: ``(4,)``, see `GaussianProcess`.
         linear: ``(theta_dim,)``, answer of `LocallyLinear`.
         units: ``(2, dim)``, see `in_lengths`.
         spreads: ``(theta_dim,)``, unit of the steps.
         box: ``(2, theta_dim)``, corners of the box around all thetas.
     """
-    rows, m, noise = learnt_from(near, alike, len(thetas)), len(goal), kernel[3]
+    rows, m, noise = rows_to_fit(near, alike, len(thetas)), len(goal), kernel[3]
     first = len(rows) - len(near)
-    process = fitted(columns(inputs, rows), columns(outcomes, rows), kernel)
+    process = fitted_process(columns(inputs, rows), columns(outcomes, rows), kernel)
     precision = precisions(process.factor, len(near))
     # The mean squared error of predicting each exemplar from all others, divided by the expected one.
     surprise = 0.0
@@ -274,15 +281,15 @@ def answer(
             surprise += process.weights[k, first + j] ** 2 / precision[j] / (len(near) * m * process.variance)
     # Two corrections inflate the variance: one for surprising exemplars here, and one because a process with many
     # lengths, fitted to few movements, errs most at the candidates that look best.
-    doubt = m * max(1.0, surprise) * (1 + units.shape[1] ** 2 / len(thetas))
+    inflation = m * max(1.0, surprise) * (1 + units.shape[1] ** 2 / len(thetas))
     covariance, slope = np.empty(len(rows)), np.empty(len(rows))
     least, nearest, best = np.inf, np.inf, linear
     for j in range(len(near)):
         if len(context):
             covariances(process.inputs, kernel, in_lengths(thetas[near[j]], context, units), covariance, slope)
-            error = expected_error(process, goal, doubt, covariance, least)
+            error = expected_error(process, goal, inflation, covariance, least)
         else:  # its outcome without its noise, and the variance of that
-            error = doubt * process.variance * noise * max(1 - noise * precision[j], 0.0)
+            error = inflation * process.variance * noise * max(1 - noise * precision[j], 0.0)
             for k in range(m):
                 error += (outcomes[near[j], k] - noise * process.weights[k, first + j] - goal[k]) ** 2
         if j == 0:
@@ -290,22 +297,22 @@ def answer(
         if error < least:
             least, best = error, thetas[near[j]]
     covariances(process.inputs, kernel, in_lengths(linear, context, units), covariance, slope)
-    error = expected_error(process, goal, doubt, covariance, least)
+    error = expected_error(process, goal, inflation, covariance, least)
     if error < least:
         least, best = error, linear
     for row in near[:STARTS]:
-        error, found = descend(process, thetas[row], context, goal, doubt, units, spreads, box)
+        error, theta = descend(process, thetas[row], context, goal, inflation, units, spreads, box)
         if error < least:
-            least, best = error, found
+            least, best = error, theta
     best = best.copy() if least < CLEARLY * nearest else thetas[near[0]].copy()
     outcome, variance = prediction(process, in_lengths(best, context, units))
     return best, outcome, np.sqrt(max(1.0, surprise) * (variance + process.variance * noise))
 
 
 @compiled_for(TABLE, TABLE, ROWS, NUMBERS, NUMBERS)
-def foretell(inputs: Array, outcomes: Array, rows: np.ndarray, here: Array, kernel: Array) -> tuple[Array, float]:
+def foretell(inputs: Array, outcomes: Array, rows: np.ndarray, point: Array, kernel: Array) -> tuple[Array, float]:
     """Expected outcome of a movement, and its variance, by the process of the movements in ``rows``."""
-    return prediction(fitted(columns(inputs, rows), columns(outcomes, rows), kernel), here.copy())
+    return prediction(fitted_process(columns(inputs, rows), columns(outcomes, rows), kernel), point.copy())
 
 
 @compiled_for(NUMBERS, NUMBERS, TABLE, NUMBERS, NUMBER)
@@ -319,7 +326,7 @@ def scores(diagonal: Array, beside: Array, outcomes: Array, noises: Array, state
         stated: standard deviation of the noise, as the environment states it.
     """
     m, n = outcomes.shape
-    found = np.empty(len(noises))
+    likelihoods = np.empty(len(noises))
     for a in range(len(noises)):
         white, pivot = outcomes[:, 0].copy(), diagonal[0] + noises[a]
         total, logs = white @ white / pivot, np.log(pivot)
@@ -331,10 +338,10 @@ def scores(diagonal: Array, beside: Array, outcomes: Array, noises: Array, state
                 white[k] = outcomes[k, i] - ratio * white[k]
                 total += white[k] ** 2 / pivot
         variance = max(total / (n * m), TINY)
-        found[a] = -0.5 * m * (n * np.log(variance) + logs)
+        likelihoods[a] = -0.5 * m * (n * np.log(variance) + logs)
         if stated > 0:
-            found[a] -= 2 * m * np.log(noises[a] * variance / stated**2) ** 2 * n / 60
-    return found
+            likelihoods[a] -= 2 * m * np.log(noises[a] * variance / stated**2) ** 2 * n / 60
+    return likelihoods
 
 
 @compiled_for(TABLE, TABLE, TABLE, TABLE, NUMBER)

@@ -52,21 +52,21 @@ def locally_linear(alike: np.ndarray, thetas: Array, outcomes: Array, goal: Arra
         if unreliability < least:
             best, least = h, unreliability
     rows = alike[best, : sizes[best]]
-    there, landed = columns(thetas, rows), columns(outcomes, rows)
+    neighbours, landed = columns(thetas, rows), columns(outcomes, rows)
     weights = np.array([np.sqrt(squared_distance(landed[:, j], goal)) for j in range(len(rows))])
     weights /= max(SMALLEST, WIDTH * weights.mean())
     weights = np.exp(0.5 * (weights.min() ** 2 - weights**2))  # eq. (9), see `inverses.local`
     weights /= weights.sum()
-    theta, outcome, largest = there @ weights, landed @ weights, np.abs(landed).max()
+    theta, outcome, largest = neighbours @ weights, landed @ weights, np.abs(landed).max()
     for k in range(len(theta)):  # a mean lies between the values that it averages; rounding must not move it out
-        theta[k] = min(max(theta[k], there[k].min()), there[k].max())
-        there[k] -= theta[k]
+        theta[k] = min(max(theta[k], neighbours[k].min()), neighbours[k].max())
+        neighbours[k] -= theta[k]
     for k in range(len(outcome)):
         landed[k] -= outcome[k]
     covariance = (landed * weights) @ landed.T
     variance = np.trace(covariance)
     if variance > (COINCIDENT * largest) ** 2:
         slope = np.linalg.solve(covariance + RIDGE * variance * np.eye(len(goal)), goal - outcome)
-        step = there @ (weights * (slope @ landed))
+        step = neighbours @ (weights * (slope @ landed))
         theta = np.minimum(np.maximum(theta + step, box[0]), box[1])
     return best, theta

@@ -22,15 +22,17 @@ from sgimd_torch.memory.table import Table
 from sgimd_torch.parts import Inverse, Problem
 from sgimd_torch.spaces import Array, Estimate, stream
 
-_FIRST, _GROWTH = 16, 1.5  # number of exemplars at the first fit, and its growth factor from fit to fit
+_FIRST: Final = 16  # number of exemplars at the first fit
+_GROWTH: Final = 1.5  # factor of the number of exemplars from fit to fit
 _FITTED: Final = 300  # number of exemplars, drawn from all, to which lengths are fitted
-_GROUPS, _GROUP = 8, 60  # number of groups of neighbours that determine the kernel, and of exemplars in each
+_GROUPS: Final = 8  # number of groups of neighbours that determine the kernel
+_GROUP: Final = 60  # number of exemplars in each group
 _NEAR: Final = 20  # exemplars with outcomes nearest to the goal, on which the surprise of the process is measured
-_LEARNT: Final = 100  # exemplars to which the process is fitted, the `_NEAR` ones among them
+_MOST_ALIKE: Final = 100  # exemplars to which the process is fitted, the `_NEAR` ones among them
 _FAR: Final = 1e3  # inputs more spreads from 0 are shifted to 0 first: rounding would hide their differences
 
 
-class Learnt(NamedTuple):
+class FittedKernel(NamedTuple):
     """Exemplars in lengths, ``(n, dim)``; origin and size of a length ``(2, dim)``; kernel ``(4,)``, see `Kernel`."""
 
     inputs: Neighbours
@@ -59,7 +61,7 @@ class LocalProcess(Inverse):
     def __call__(self, context: Array, goal: Array) -> Estimate:
         """The answer, and the exemplars of the nearest outcomes, nearest first."""
         memory = self.memory
-        context, goal = (np.ascontiguousarray(each, dtype=np.float64) for each in (context, goal))
+        context, goal = (np.ascontiguousarray(point, dtype=np.float64) for point in (context, goal))
         self._catch_up()
         near = near_goal(memory, context, goal, _NEAR)
         thetas = memory.thetas[near]
@@ -67,7 +69,7 @@ class LocalProcess(Inverse):
             return Estimate(thetas[0], thetas, memory.outcomes[near], context)
         linear, _ = self._linear.correct(near[:NEAR], goal)
         inputs, kernels = self._inputs.keys.rows, compiled("sgimd_torch.inverses.kernels")
-        alike = self._inputs.nearest(inputs[near[: kernels.STARTS]], _LEARNT)
+        alike = self._inputs.nearest(inputs[near[: kernels.STARTS]], _MOST_ALIKE)
         theta, expected, sd = kernels.answer(
             near,
             alike,
@@ -87,23 +89,23 @@ class LocalProcess(Inverse):
     def predict(self, context: Array, theta: Array) -> Array | None:
         """Expected outcome ``(outcome_dim,)`` of ``theta``, from similar movements. While all outcomes are equal, the
         prediction is that outcome. While there are too few exemplars, it is None."""
-        found = self.predict_variance(context, theta)
-        return None if found is None else found[0]
+        prediction = self.predict_variance(context, theta)
+        return None if prediction is None else prediction[0]
 
     def predict_variance(self, context: Array, theta: Array) -> tuple[Array, float] | None:
         """The result of `predict`, and the variance of each dimension, without noise."""
         self._catch_up()
         if self._kernel is None:
             return (self.memory.outcomes[-1], 0.0) if self._due > _FIRST else None
-        here = (np.concatenate((theta, context)) - self._units[0]) / self._units[1]
-        (rows,) = self._inputs.nearest(here[None], _LEARNT)
+        point = (np.concatenate((theta, context)) - self._units[0]) / self._units[1]
+        (rows,) = self._inputs.nearest(point[None], _MOST_ALIKE)
         kernels = compiled("sgimd_torch.inverses.kernels")
-        return kernels.foretell(self._inputs.keys.rows, self.memory.outcomes, rows, here, self._kernel)
+        return kernels.foretell(self._inputs.keys.rows, self.memory.outcomes, rows, point, self._kernel)
 
-    def learnt(self) -> Learnt | None:
+    def fitted(self) -> FittedKernel | None:
         """What predictions are made from; None while there are too few exemplars, or all outcomes are equal."""
         self._catch_up()
-        return None if self._kernel is None else Learnt(self._inputs, self._units, self._kernel)
+        return None if self._kernel is None else FittedKernel(self._inputs, self._units, self._kernel)
 
     def _catch_up(self) -> None:
         """Add new exemplars; refit when the memory has grown by half."""
@@ -152,5 +154,5 @@ class LocalProcess(Inverse):
 
 def _spreads(inputs: Array) -> Array:
     """Standard deviations ``(dim,)`` of ``inputs``; 1 for constant inputs."""
-    found = inputs.std(axis=0)
-    return np.where(found > 0, found, 1.0)
+    deviations = inputs.std(axis=0)
+    return np.where(deviations > 0, deviations, 1.0)

@@ -118,9 +118,9 @@ class Memory:
         Raises:
             ValueError: the memory has other dimensions of context, theta or outcome.
         """
-        found = self.context_dim, self.theta_dim, self.outcome_dim
-        if found != dims:
-            raise ValueError(f"a memory to start from must have dims {dims} of context, theta, outcome, got {found}")
+        own = self.context_dim, self.theta_dim, self.outcome_dim
+        if own != dims:
+            raise ValueError(f"a memory to start from must have dims {dims} of context, theta, outcome, got {own}")
         return self.copy()
 
     def copy(self) -> Memory:

@@ -1,83 +1,80 @@
 """Loads the modules whose functions numba compiles; without this, numba would be loaded with the package.
 
 kernels = compiled("sgimd_torch.inverses.kernels"); kernels.answer(...)
-Numba compiles once for each processor and version, and keeps what it compiled beside the module, or in the cache folder
-of the user if the package cannot be written to, or where ``NUMBA_CACHE_DIR`` says. Two processes may compile at once.
-Each module is compiled in a process of its own, because the last bits of results depend on what the process has
-compiled before. scripts/setup compiles all, by `compile_all`.
+Numba compiles once for each processor and version. It notices changes of a file, but not of what this file calls. So
+the folder of what it compiles has a checksum of all compiled sources as its name. This folder lies beside this module,
+or in the cache folder of the user if the package cannot be written to, or where ``NUMBA_CACHE_DIR`` says. Two processes
+may compile at once.
 """
 
 from __future__ import annotations
 
 import importlib
-import os
-import subprocess
+import shutil
 import sys
 import tempfile
+import zlib
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, Final
 
-_PROJECT = Path(__file__).parents[2]
-
-
-class _NotCompiledError(RuntimeError):
-    pass
+MODULES: Final = ("memory.jit", "memory.scan", "inverses.linear_kernel", "inverses.kernels", "changes.kernels")
+_PACKAGE: Final = Path(__file__).parents[1]
 
 
 @cache
 def compiled(name: str) -> ModuleType:
     """The module of this ``name``. If its functions have to be compiled first, a line on stderr says so."""
-    import numba
+    from numba import config
     from numba.core import event
 
-    class Refusing(event.Listener):
+    class Telling(event.Listener):
         def on_start(self, event: Any) -> None:
-            raise _NotCompiledError
+            _tell()
 
         def on_end(self, event: Any) -> None:
             pass
 
+    folder, config.CACHE_DIR = config.CACHE_DIR, _folder(config.CACHE_DIR)  # type: ignore[attr-defined]
     try:
-        with event.install_listener("numba:compile", Refusing()):
-            return importlib.import_module(name)
-    except _NotCompiledError:
-        pass
-    except RuntimeError as error:
-        if "cannot cache" not in str(error):
-            raise
-        # No folder can be written to, not even the user's; so it is compiled for this process alone.
-        numba.config.CACHE_DIR = _own_folder().name  # type: ignore[attr-defined]
-    _compile(name)
-    return importlib.import_module(name)
+        with event.install_listener("numba:compile", Telling()):
+            try:
+                return importlib.import_module(name)
+            except Exception:  # damaged files raise errors of many kinds; any other error is raised again
+                shutil.rmtree(config.CACHE_DIR, ignore_errors=True)  # type: ignore[attr-defined]
+                return importlib.import_module(name)
+    finally:
+        config.CACHE_DIR = folder  # type: ignore[attr-defined]
 
 
 def compile_all() -> None:
     """Compile all functions that are not in the cache yet."""
-    names = ("inverses.kernels", "inverses.linear_kernel", "memory.scan", "changes.kernels")
-    _compile(*(f"sgimd_torch.{name}" for name in names))
-
-
-def _compile(*names: str) -> None:
-    """Compile these modules side by side."""
-    import numba
-
-    _tell()
-    where = {**os.environ, "NUMBA_CACHE_DIR": numba.config.CACHE_DIR}  # type: ignore[attr-defined]
-    commands = [[sys.executable, "-c", f"import {name}"] for name in names]
-    running = [subprocess.Popen(each, cwd=_PROJECT, env=where, stderr=subprocess.PIPE, text=True) for each in commands]
-    for each in running:
-        _, said = each.communicate()
-        if each.returncode:
-            raise RuntimeError(said)
+    for name in MODULES:
+        compiled(f"sgimd_torch.{name}")
 
 
 @cache
-def _tell() -> None:
-    print("compiling once, about 15 s", file=sys.stderr, flush=True)
+def _folder(chosen: str) -> str:
+    """A folder for what is compiled from the present sources, in the ``chosen`` folder if there is one."""
+    from numba.misc.appdirs import user_cache_dir
+
+    sources = [(_PACKAGE / name.replace(".", "/")).with_suffix(".py").read_bytes() for name in MODULES]
+    for parent in [chosen] if chosen else [_PACKAGE / "memory" / "__pycache__", user_cache_dir("sgimd_torch")]:  # type: ignore[no-untyped-call]
+        folder = Path(parent) / f"compiled-{zlib.crc32(b''.join(sources)):08x}"
+        with suppress(OSError):
+            folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryFile(dir=folder):
+                return str(folder)
+    return _own_folder().name  # no folder can be written to, so it is compiled for this process alone
 
 
 @cache
 def _own_folder() -> tempfile.TemporaryDirectory[str]:
     return tempfile.TemporaryDirectory(prefix="numba-")
+
+
+@cache
+def _tell() -> None:
+    print("compiling once, about 15 s", file=sys.stderr, flush=True)

@@ -34,8 +34,8 @@ def squared_distance(one: Array, other: Array) -> float:
 @inner
 def columns(table: Array, rows: np.ndarray) -> Array:
     """``(dim, n)``, these rows of a table."""
-    found = np.empty((table.shape[1], len(rows)))
+    selected = np.empty((table.shape[1], len(rows)))
     for j in range(len(rows)):
-        for k in range(len(found)):
-            found[k, j] = table[rows[j], k]
-    return found
+        for k in range(len(selected)):
+            selected[k, j] = table[rows[j], k]
+    return selected

@@ -1,4 +1,4 @@
-"""A robot that changes: it is noticed, told and repeated, and what was learnt before counts only as far as it holds."""
+"""A robot that changes: it is noticed, told and repeated; earlier exemplars are kept if they help now."""
 
 from functools import partial
 
@@ -10,7 +10,7 @@ from sgimd_torch.algorithms.families import TwoFamilies
 from sgimd_torch.algorithms.paper import sagg_riac, sgim_d
 from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.changes.calibration import Calibration
-from sgimd_torch.changes.regimes import Exemplars, Regime
+from sgimd_torch.changes.eras import Era, Exemplars
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.forward_model.search import GradientSearch
@@ -240,9 +240,9 @@ def test_a_calibration_finds_offset_and_gain():
     rng = stream(0, "calibration")
     memory = executed(ARM, rng.uniform(0.2, 0.8, (300, 3)))
     given = problem(ARM, memory=memory)
-    regime = Regime(LocalProcess(given).learnt(), Exemplars.of(memory))
+    era = Era(LocalProcess(given).fitted(), Exemplars.of(memory))
     now = Exemplars.of(memory, slice(100, 140))
     now = now._replace(thetas=0.5 + (now.thetas - 0.5 - 0.04) / 0.9)  # movements of now that do what those did before
-    found = Calibration(regime, ARM.policies).fit(now)
+    found = Calibration(era, ARM.policies).fit(now)
     assert np.abs(found.predict(now) - now.outcomes).max() < 0.02
     assert found.p[:6] == pytest.approx([-0.1] * 3 + [0.04] * 3, abs=0.02)

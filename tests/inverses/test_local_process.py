@@ -45,8 +45,8 @@ def waves(n: int = 30) -> tuple[Array, Array]:
     return inputs, np.stack([np.sin(inputs.sum(axis=1)), np.cos(inputs[:, 0])], axis=1)
 
 
-def fitted(inputs: Array, outcomes: Array, kernel: Kernel) -> kernels.Process:
-    return kernels.fitted(np.ascontiguousarray(inputs.T), np.ascontiguousarray(outcomes.T), np.array(kernel))
+def fitted(inputs: Array, outcomes: Array, kernel: Kernel) -> kernels.GaussianProcess:
+    return kernels.fitted_process(np.ascontiguousarray(inputs.T), np.ascontiguousarray(outcomes.T), np.array(kernel))
 
 
 def predicted(inputs: Array, outcomes: Array, kernel: Kernel, point: Array) -> tuple[Array, float]:

@@ -1,6 +1,6 @@
-"""A regime: what a local process has learnt while the robot was the same, and predictions from it.
+"""An era: exemplars of a time in which the robot stayed the same, and predictions from them.
 
-regime = Regime(learnt, exemplars); outcomes, variances, slopes = regime.predict(contexts, thetas)
+era = Era(fitted, exemplars); outcomes, variances, slopes = era.predict(contexts, thetas)
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import Final, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from sgimd_torch.inverses.local_process import Learnt
+from sgimd_torch.inverses.local_process import FittedKernel
 from sgimd_torch.memory import Memory, Rows
 from sgimd_torch.memory.compiled import compiled
 from sgimd_torch.memory.neighbours import Neighbours
@@ -48,20 +48,20 @@ class Exemplars(NamedTuple):
         return memory
 
 
-class Regime:
-    """Predictions from some ``exemplars`` at any theta, outside Pi, too, by lengths and kernel of ``learnt``."""
+class Era:
+    """Predictions from some ``exemplars`` at any theta, outside Pi, too, by lengths and kernel of ``fitted``."""
 
-    def __init__(self, learnt: Learnt, exemplars: Exemplars) -> None:
-        self.learnt, self.exemplars = learnt, exemplars
-        here = self._in_lengths(exemplars)
-        self._neighbours = Neighbours(Table(here.shape[1]))
-        self._neighbours.keys.append(here)
+    def __init__(self, fitted: FittedKernel, exemplars: Exemplars) -> None:
+        self.fitted, self.exemplars = fitted, exemplars
+        inputs = self._in_lengths(exemplars)
+        self._neighbours = Neighbours(Table(inputs.shape[1]))
+        self._neighbours.keys.append(inputs)
 
     def predict(self, asked: Exemplars) -> tuple[Array, Array, Array]:
         """Outcomes ``(n, outcome_dim)``, variances ``(n,)`` with noise, slopes ``(n, outcome_dim, theta_dim)``."""
-        here, dim = self._in_lengths(asked), asked.thetas.shape[1]
-        found, variances, slopes = self._predict(self._neighbours.nearest(here, NEAR), here)
-        return found, variances, slopes[:, :, :dim] / self.learnt.units[1, :dim]
+        points, dim = self._in_lengths(asked), asked.thetas.shape[1]
+        expected, variances, slopes = self._predict(self._neighbours.nearest(points, NEAR), points)
+        return expected, variances, slopes[:, :, :dim] / self.fitted.units[1, :dim]
 
     def errors(self, told: Exemplars) -> Array:
         """Squared errors ``(n,)`` of predicting these movements."""
@@ -69,32 +69,32 @@ class Regime:
 
     def left_out(self, rows: Rows) -> tuple[Array, Array]:
         """Squared errors ``(n,)`` of predicting each of these rows from all other rows, and their variances."""
-        here = self._neighbours.keys.rows[rows]
-        near = self._neighbours.nearest(here, NEAR + 1)
+        points = self._neighbours.keys.rows[rows]
+        near = self._neighbours.nearest(points, NEAR + 1)
         itself_last = np.argsort(near == rows[:, None], axis=1, kind="stable")
-        found, variances, _ = self._predict(np.take_along_axis(near, itself_last[:, :-1], axis=1), here)
-        return squared(found - self.exemplars.outcomes[rows]), variances
+        expected, variances, _ = self._predict(np.take_along_axis(near, itself_last[:, :-1], axis=1), points)
+        return squared(expected - self.exemplars.outcomes[rows]), variances
 
-    def doubt(self, rows: Rows) -> float:
+    def inflation(self, rows: Rows) -> float:
         """Mean squared error of predicting each of these rows from all others, divided by the expected one."""
         errors, variances = self.left_out(rows)
         return float(errors.sum() / (variances.sum() * self.exemplars.outcomes.shape[1] + 1e-300))
 
     def _in_lengths(self, some: Exemplars) -> Array:
-        raw, (origin, size) = np.concatenate((some.thetas, some.contexts), axis=1), self.learnt.units
+        raw, (origin, size) = np.concatenate((some.thetas, some.contexts), axis=1), self.fitted.units
         return np.asarray((raw - origin) / size)
 
-    def _predict(self, near: Rows, here: Array) -> tuple[Array, Array, Array]:
-        return predicted(self._neighbours, self.exemplars.outcomes, near, here, self.learnt.kernel)
+    def _predict(self, near: Rows, points: Array) -> tuple[Array, Array, Array]:
+        return predicted(self._neighbours, self.exemplars.outcomes, near, points, self.fitted.kernel)
 
 
 def predicted(
-    inputs: Neighbours, outcomes: Array, near: Rows, here: Array, kernel: Array
+    inputs: Neighbours, outcomes: Array, near: Rows, points: Array, kernel: Array
 ) -> tuple[Array, Array, Array]:
     """Result of `kernels.predict`."""
     predict = compiled("sgimd_torch.changes.kernels").predict
-    found: tuple[Array, Array, Array] = predict(inputs.keys.rows, outcomes, near, here, kernel)
-    return found
+    predictions: tuple[Array, Array, Array] = predict(inputs.keys.rows, outcomes, near, points, kernel)
+    return predictions
 
 
 def squared(differences: Array) -> Array:

@@ -1,0 +1,244 @@
+"""Detects that a robot has changed, and finds out which exemplars of earlier eras still help.
+
+An era is a part of a life in which the robot stays the same.
+
+Each movement is predicted before its outcome is remembered. A CUSUM on surprises beyond the usual ones (Page 1954) says
+since when predictions fail. Then it is tested whether the movements since then predict each other better, or whether a
+calibration of what was known predicts them better: noise alone does neither. Everything follows from the exemplars and
+their order, so a replay notices the same.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from sgimd_torch.changes.calibration import Calibration, by_halves
+from sgimd_torch.changes.eras import NEAR, Era, Exemplars, predicted, squared
+from sgimd_torch.inverses.gaussian_process import one_thread
+from sgimd_torch.inverses.local_process import LocalProcess
+from sgimd_torch.memory import Memory, Rows
+from sgimd_torch.parts import Problem
+from sgimd_torch.spaces import Array
+
+_RECENT: Final = 200  # number of last surprises from which the usual surprise is taken
+_SURPRISING: Final = 4.0  # surprise, relative to the usual one, above which a prediction counts for the CUSUM
+_DRIFT: Final = 0.12  # number that the CUSUM loses with each movement
+_SUSPICIOUS: Final = 3.0  # CUSUM from which on a change is suspected
+_FIRST: Final = 50  # least number of exemplars before a change is suspected
+_PREDICTED: Final = 30  # least number of predictions in an era before a change is suspected
+_TESTED_AFTER: Final = (
+    16,
+    24,
+    36,
+    54,
+    81,
+    122,
+    182,
+    273,
+)  # numbers of movements since a suspicion at which it is tested
+_EVERY: Final = 64  # number of movements between two tests without a suspicion
+_SLOW: Final = 128  # number of last movements that such a test compares
+_FAILED: Final = 6.0  # squared error, relative to the expected one, above which a prediction has failed
+_SURE: Final = 3.5  # statistic T from which on a test is passed
+_LARGEST_GAIN: Final = 1.5  # bound of the log ratio of two errors
+_TESTED: Final = 128  # largest number of newest movements that are tested
+_ERAS: Final = 3  # largest number of earlier eras that are kept
+_SURER: Final = 0.5  # largest variance of the outcome of an earlier exemplar now, relative to its variance without it
+_GROWTH: Final = 2  # factor of the length of an era from one comparison with earlier eras to the next
+_FIRST_REVIEW: Final = 8  # number of movements at the first such comparison with a prior
+_ALONE: Final = 24  # least number of movements that get lengths and kernel of their own
+_CALIBRATED: Final = 12  # least number of movements that calibrate an earlier era
+
+
+class Restart(NamedTuple):
+    """What a learner begins again with.
+
+    Attributes:
+        exemplars: helpful exemplars of an earlier era, then all of the present era.
+        n_kept: number of the helpful ones.
+        n_before: number of exemplars of the earlier era.
+        is_new: whether the present era has begun now.
+    """
+
+    exemplars: Exemplars
+    n_kept: int
+    n_before: int
+    is_new: bool
+
+
+class ChangeDetector:
+    """Compares the exemplars of a learner with predictions.
+
+    Args:
+        problem: problem to learn, with its spaces and noise.
+        life: all exemplars of the learner.
+        prior: exemplars of another robot, such as a simulator: an earlier era from the start. None: there is none.
+
+    Attributes:
+        since: row of ``life`` in which the present era began.
+    """
+
+    def __init__(self, problem: Problem, life: Memory, prior: Memory | None) -> None:
+        self.problem, self.life, self.noise = problem, life, problem.outcome_noise
+        self.since = self._compared = 0
+        self._eras: list[Era] = []  # earlier ones; the one that helped last comes last
+        self._review = 0  # length of the era at which to compare it with earlier eras again, 0: never
+        self._reset_suspicion()
+        if prior is not None:
+            self._review = _FIRST_REVIEW
+            if (fitted := LocalProcess(problem.over(prior)).fitted()) is not None:
+                self._eras = [Era(fitted, Exemplars.of(prior))]
+
+    def _reset_suspicion(self) -> None:
+        self._surprises: list[float] = []
+        self._errors: list[float] = []
+        self._cusum, self._suspected_at, self._last_quiet, self._n_tests = 0.0, -1, 0, 0
+
+    def expect(self, process: LocalProcess, context: Array, theta: Array, outcome: Array) -> None:
+        """Predict a movement that is not in memory yet, and compare."""
+        fitted = process.fitted()
+        if fitted is None:
+            return
+        point = ((np.concatenate((theta, context)) - fitted.units[0]) / fitted.units[1])[None]
+        near = fitted.inputs.nearest(point, NEAR)
+        expected, (variance,), _ = predicted(fitted.inputs, process.memory.outcomes, near, point, fitted.kernel)
+        self._errors.append(float(squared(expected[0] - outcome)))
+        surprise = self._errors[-1] / (len(outcome) * float(variance) + 1e-300)
+        self._surprises = [*self._surprises[-_RECENT:], surprise]
+        if len(process.memory) >= _FIRST and len(self._surprises) >= _PREDICTED:
+            self._accumulate(len(self.life) + 1)
+
+    def restart_if_changed(self, process: LocalProcess) -> Restart | None:
+        """What to begin again with; None to go on."""
+        n = len(self.life)
+        if self._suspected_at < 0 and self._review and n - self.since >= self._review:
+            return self._restart(is_new=False)
+        m = self._suspected(process, n)
+        if m and (m := self._changed(process, m)):
+            fitted, before = process.fitted(), Exemplars.of(process.memory, slice(len(process.memory) - m))
+            assert fitted is not None
+            self._eras, self.since = [*self._eras, Era(fitted, before)][-_ERAS:], n - m
+            return self._restart(is_new=True)
+        return None
+
+    def _accumulate(self, n: int) -> None:
+        """Add the last surprise to the CUSUM; ``n``: number of exemplars with this one."""
+        if self._suspected_at < 0:
+            self._usual = _fourth_fifth(self._surprises[:-1])
+        self._cusum = max(0.0, self._cusum + (self._surprises[-1] > _SURPRISING * self._usual) - _DRIFT)
+        if self._suspected_at < 0:
+            if self._cusum == 0:
+                self._last_quiet = n
+            if self._cusum >= _SUSPICIOUS:
+                self._suspected_at, self._n_tests = self._last_quiet, 0
+                self._usual = _fourth_fifth(self._surprises[: self._last_quiet - n] or self._surprises)
+
+    def _suspected(self, process: LocalProcess, n: int) -> int:
+        """How many of the last movements to test now."""
+        if self._suspected_at < 0:
+            return self._drifted(process, n)
+        m = n - self._suspected_at
+        due = sum(m >= moment for moment in _TESTED_AFTER)
+        if due > self._n_tests:
+            self._n_tests = due
+            return m
+        if self._cusum == 0 or m > _TESTED_AFTER[-1]:
+            self._reset_suspicion()
+        return 0
+
+    def _drifted(self, process: LocalProcess, n: int) -> int:
+        """Without a suspicion, how many of the last movements predict each other better than they were predicted."""
+        m, fitted = _SLOW, process.fitted()
+        if n - self._compared < _EVERY or fitted is None:
+            return 0
+        self._compared = n
+        if len(self._errors) < m or len(process.memory) < 4 * m:
+            return 0
+        others, _ = Era(fitted, Exemplars.of(process.memory, slice(-m, None))).left_out(np.arange(m))
+        return m if self._better(np.array(self._errors[-m:]), others) >= _SURE else 0
+
+    @one_thread
+    def _changed(self, process: LocalProcess, m: int) -> int:
+        """How many of the last ``m`` movements are of another era."""
+        fitted, memory, n = process.fitted(), process.memory, len(process.memory)
+        if fitted is None or n - m < _PREDICTED:
+            return 0
+        rows = np.arange(max(n - m, n - _TESTED), n)
+        told, before = Exemplars.of(memory, rows), Era(fitted, Exemplars.of(memory, slice(n - m)))
+        expected, variances, _ = before.predict(told)
+        as_it_was, failed = squared(expected - told.outcomes), variances * _FAILED * memory.outcome_dim
+        # If nothing had changed, both would predict; the first errs more where noise has grown.
+        nulls = Era(fitted, Exemplars.of(memory)).left_out(rows)[0], as_it_was
+        alone, _ = Era(fitted, told).left_out(np.arange(len(rows)))
+        for other in (alone, by_halves(before, self.problem.policies, told)):
+            for which in (slice(None), as_it_was > failed):  # a local change is seen in those that failed
+                if all(self._better(null[which], other[which]) >= _SURE for null in nulls):
+                    # The suspicion may have begun too early: the first movements then fit the old era better.
+                    gains = np.zeros(len(rows))
+                    gains[which] = self._gains(as_it_was, other)[which]
+                    last = 1 + int(gains[::-1].cumsum().argmax())
+                    return m if last == len(rows) else last
+        return 0
+
+    def _gains(self, errors: Array, others: Array) -> Array:
+        """By how much others predict better: log ratios of errors; noise limits both."""
+        floor = self.noise**2 + 1e-300
+        return np.clip(0.5 * np.log((errors + floor) / (others + floor)), -_LARGEST_GAIN, _LARGEST_GAIN)
+
+    def _better(self, errors: Array, others: Array) -> float:
+        """T, self-normalised: how sure it is that others predict better."""
+        gains = self._gains(errors, others)
+        return float(gains.sum() / np.sqrt(squared(gains) + 1e-300))
+
+    @one_thread
+    def _restart(self, *, is_new: bool) -> Restart:
+        """Exemplars of earlier eras that help to predict this one, then all of this one."""
+        now = Exemplars.of(self.life, slice(self.since, None))
+        n, kept, before, best = len(now.thetas), now.some(slice(0)), 0, -np.inf
+        test = np.arange(max(0, n - _TESTED), n)
+        told = now.some(test)
+        for era in self._eras:
+            mine, _ = self._process(now, era).left_out(test)
+            errors = [era.errors(told)]
+            errors += [by_halves(era, self.problem.policies, told)] if n >= _CALIBRATED else []
+            for calibration, of_era in enumerate(errors):
+                if (gain := float(self._gains(mine, of_era).mean())) > best:
+                    best, chosen, calibrated, alone = gain, era, bool(calibration), mine
+        if self._eras:
+            self._eras = [*(era for era in self._eras if era is not chosen), chosen]
+            helpful, before = self._helpful(chosen, calibrated, now, test), len(chosen.exemplars.thetas)
+            together, _ = self._process(helpful.and_then(now), chosen).left_out(len(helpful.thetas) + test)
+            kept = helpful if self._gains(alone, together).mean() >= 0 else kept
+        self._review, self._errors = _GROWTH * n if len(kept.thetas) else 0, []
+        if is_new:
+            self._reset_suspicion()
+        return Restart(kept.and_then(now), len(kept.thetas), before, is_new)
+
+    def _process(self, exemplars: Exemplars, era: Era) -> Era:
+        """A process of these exemplars; if they are few, with lengths and kernel of an earlier era."""
+        few = len(exemplars.thetas) < _ALONE
+        fitted = None if few else LocalProcess(self.problem.over(exemplars.memory)).fitted()
+        return Era(fitted or era.fitted, exemplars)
+
+    def _helpful(self, era: Era, calibrated: bool, now: Exemplars, test: Rows) -> Exemplars:
+        """Exemplars of an earlier era, as they would come out now, where they are surer than those of now.
+
+        What a calibration leaves unexplained is a process, too.
+        """
+        calibration = Calibration(era, self.problem.policies)
+        if calibrated:
+            calibration.fit(now.some(test))
+        left = now._replace(outcomes=now.outcomes - calibration.predict(now))
+        before = calibration.translated(max(float(np.median(squared(left.outcomes[test]))), self.noise**2))
+        of_left, alone = self._process(left, era), self._process(now, era)
+        wrong, variances, _ = of_left.predict(before)
+        without = alone.predict(before)[1] * alone.inflation(test)
+        corrected = before._replace(outcomes=before.outcomes + wrong)
+        return corrected.some(variances * of_left.inflation(test) < _SURER * without)
+
+
+def _fourth_fifth(values: list[float]) -> float:
+    """The value below which four fifths of the values lie."""
+    return sorted(values)[int(0.8 * len(values))]
