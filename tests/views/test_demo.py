@@ -75,7 +75,5 @@ def test_options_of_a_run_are_those_of_all_three():
     assert [*configs] == [*LEARNERS]
     runs = configs.values()
     given = {(config.seed, config["environment.noise"], config.movements, config.floor_at) for config in runs}
-        (config.seed, config["environment.noise"], config.movements, config.floor_at) for config in configs.values()
-    }
     assert given == {(4, 0.0, 70, ())}  # the noise floor would take a tenth of the time
     assert {config.out for config in configs_of([]).values()} == {Path("runs/demo")}
