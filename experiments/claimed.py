@@ -20,7 +20,8 @@ from variants import ARMS, FOUR, HALVES, ROD, SPARSE, VARIANTS
 TIMES: Final = (250, 500, 1000, 2000)
 WHOLE: Final = (*TIMES, LAST)
 SUITE: Final = tuple(task for task in TASKS if task not in SPARSE)
-EVERY, COST = 30, 10  # movements between two demonstrations of SGIM-D; cost of a demonstration (movements)
+EVERY: Final = 30  # number of movements between two demonstrations of SGIM-D
+COST: Final = 10  # cost of a demonstration, in movements
 
 
 def on(name: str, task: str) -> str:

@@ -34,7 +34,8 @@ README: Final = "README"
 TEMPLATES: Final = Path(__file__).with_name("pages")
 PAGES: Final = sorted(path.name.partition(".")[0] for path in TEMPLATES.glob("*.md.j2"))
 MADE: Final = "<!-- Made by experiments/claims.py"
-BEGIN, END = "<!-- results: made by experiments/claims.py from experiments/pages/README.md.j2 -->", "<!-- end -->"
+BEGIN: Final = "<!-- results: made by experiments/claims.py from experiments/pages/README.md.j2 -->"  # of the section
+END: Final = "<!-- end -->"  # of the section
 
 
 def filled(name: str, evidence: Evidence, folder: Path) -> tuple[str, Page]:

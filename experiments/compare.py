@@ -49,7 +49,7 @@ examples:
 
 Exit code: 0 all runs are in the tables, 1 some failed, 2 the request is wrong, 130 or 143 stopped by a signal.
 """
-RUN: Final = ["variant", "seed", "movements", "answer"]
+KEY: Final = ["variant", "seed", "movements", "answer"]
 NUMBERS: Final = ["error", "floor"]
 ROUNDING: Final = 1e-5  # relative difference that rounding on another processor may cause over thousands of movements
 
@@ -66,7 +66,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     table = read_table(options.results)
     if options.verify:
         return verify(wanted, table, options)
-    known = {*table[RUN].itertuples(index=False, name=None)}
+    known = {*table[KEY].itertuples(index=False, name=None)}
     left = [config for config in wanted if not last_rows(config) <= known]
     where = options.results / FILE
     say(f"{len(wanted)} runs{options.shard.note(whole)}, {len(wanted) - len(left)} of them in {where} already")
@@ -121,7 +121,7 @@ def verify(wanted: Sequence[Config], table: pd.DataFrame, options: argparse.Name
 
 def compared(shipped: Row, now: Row) -> str:
     """Verdict on two rows: "equal", "rounding" if they differ by rounding errors alone, or "DIFFERS"."""
-    if {name: shipped[name] for name in RUN} != {name: now.get(name) for name in RUN}:
+    if {name: shipped[name] for name in KEY} != {name: now.get(name) for name in KEY}:
         return "DIFFERS"
     old, new = (np.array([row[name] for name in NUMBERS], dtype=np.float64) for row in (shipped, now))
     if np.array_equal(old, new, equal_nan=True):

@@ -17,18 +17,20 @@ from typing import Any, Final
 from sgimd_torch.runs.signals import Progress, say
 from table import TABLES, merge, read_table
 
-Life = Callable[..., Mapping[int, tuple[float, int]]]
+MakeLife = Callable[..., Mapping[int, tuple[float, int]]]
 """Function of a key that returns, for each number of movements, the error and how many changes were noticed by then."""
 _LATE: Final = -1  # the key of a row ends with its number of movements
 
 
-def make_lives(folder: Path, name: str, life: Life, lives: Mapping[tuple[Any, ...], int], processes: int) -> None:
+def make_lives(
+    folder: Path, name: str, make_life: MakeLife, lives: Mapping[tuple[Any, ...], int], processes: int
+) -> None:
     """Make the lives that the table lacks, and show progress.
 
     Args:
         folder: folder of the table.
         name: file name of the table.
-        life: function that makes a life.
+        make_life: function that makes a life.
         lives: number of movements of each life, by key; a key has the first columns of the table.
         processes: number of lives at a time.
     """
@@ -39,7 +41,7 @@ def make_lives(folder: Path, name: str, life: Life, lives: Mapping[tuple[Any, ..
     # Spawned, because a forked process would share the locks of this one's threads.
     pool = get_context("spawn").Pool(processes, signal.signal, (signal.SIGINT, signal.SIG_IGN))
     with pool, Progress(name, sum(map(lives.__getitem__, left))) as progress:
-        for n, (key, made) in enumerate(pool.imap_unordered(partial(_made, life), left), 1):
+        for n, (key, made) in enumerate(pool.imap_unordered(partial(_made, make_life), left), 1):
             merge(folder, name, [dict(zip(columns, (*key, at, *errors), strict=True)) for at, errors in made.items()])
             done += lives[key]
             progress.show(done, f"{n} of {len(left)} lives")
@@ -53,5 +55,5 @@ def parser(about: str | None) -> argparse.ArgumentParser:
     return made
 
 
-def _made(life: Life, key: tuple[Any, ...]) -> tuple[tuple[Any, ...], Mapping[int, tuple[float, int]]]:
-    return key, life(*key)
+def _made(make_life: MakeLife, key: tuple[Any, ...]) -> tuple[tuple[Any, ...], Mapping[int, tuple[float, int]]]:
+    return key, make_life(*key)

@@ -45,7 +45,8 @@ NOISES: Final = ("none", "even", "speed", "gross")
 COUNTS: Final = (50, 100, 250, 500, 1000)  # movements at which a learner is evaluated
 UNSEEN: Final = range(320, 380)  # robots of the page ANY_ROBOT, named before the first of them was run
 TABLE: Final = "random.csv"
-RANDOM, BASELINE = "random", "uniform-nearest"  # the references
+RANDOM: Final = "random"  # reference: random movements
+BASELINE: Final = "uniform-nearest"  # reference: the standard baseline
 NARROW: Final = {**PRACTICE, "explore": partial(Returning, first=0)}
 LEARNERS: Final[Mapping[str, Callable[[RandomRobot, int], Learner]]] = {
     "practice": practice,

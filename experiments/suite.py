@@ -62,7 +62,8 @@ TASKS: Final[dict[str, SuiteTask]] = {
     "puck": SuiteTask({"environment": "experiments.toys:puck"}),
     "fetch": SuiteTask({"environment": "experiments.toys:fetch"}, new=True),
 }
-RANDOM, UNIFORM = "random-nearest", "uniform-nearest"
+RANDOM: Final = "random-nearest"  # reference: random movements
+UNIFORM: Final = "uniform-nearest"  # reference: uniform goals
 REFERENCES: Final[dict[str, dict[str, Any]]] = {
     RANDOM: {"algorithm": "random", "inverse": "nearest"},
     UNIFORM: {

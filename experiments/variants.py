@@ -52,7 +52,9 @@ INVERSE: Final[Variant] = {"inverse": "paper"}  # the letter of the paper for le
 LARGE: Final[Variant] = {"environment.task_space": 100.0}
 BASELINE: Final[Variant] = {"goals": "uniform", "inverse": "nearest", "search": "perturb"}  # standard baseline
 SCHOOL: Final = ("map-elites", "cma-mae")  # algorithms of quality diversity; they take no context
-CORNER, MANY = MADE = (Path("corner.npz"), Path("many.npz"))  # files of demonstrations that ``make_subsets`` writes
+CORNER: Final = Path("corner.npz")  # file of demonstrations nearest to one corner
+MANY: Final = Path("many.npz")  # file of the first demonstrations
+MADE: Final = (CORNER, MANY)  # files that ``make_subsets`` writes
 ONCE: Final[Variant] = {"teacher": "initial", "teacher.every": 1}  # at the start, one demonstration a movement
 PRACTICE: Final[Variant] = {"algorithm": "practice"}
 WIDE: Final[Variant] = {  # the wide family of practice alone

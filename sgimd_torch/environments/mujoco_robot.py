@@ -93,7 +93,7 @@ class MujocoRobot:
     Attributes:
         bodies: indices of the bodies that the joints of the robot move.
         files: model file, and files that it includes.
-        found: T, ``rest`` and ``outcome_noise``, as options.
+        found_options: T, ``rest`` and ``outcome_noise``, as options.
         joints: names of the joints whose positions the commands are; () if they are anything else, such as torques.
         remarks: sentences for the user, for example about T.
 

@@ -26,7 +26,8 @@ algorithm    asking.algorithms          sgim-im sgim-im-search sgim-acts sgim-ac
 algorithm    rivals.quality_diversity   map-elites=map_elites_alone map-elites-taught=map_elites isoline=isoline_alone
 algorithm    rivals.quality_diversity   isoline-taught=isoline cma-me=cma_me_alone cma-me-taught=cma_me
 algorithm    rivals.quality_diversity   cma-mae=cma_mae_alone cma-mae-taught=cma_mae
-environment  runs.tasks.robots          fishing-rod planar-arm-7 planar-arm-50
+environment  runs.tasks.rod             fishing-rod
+environment  runs.tasks.robots          planar-arm-7 planar-arm-50
 environment  environments.mujoco_robot  mujoco=MujocoRobot
 goals        goals.interest_map         interest-map=InterestMap
 goals        rivals.alp_gmm             alp-gmm=AlpGmm

@@ -97,7 +97,7 @@ class Record:
                 connection.execute("BEGIN IMMEDIATE")
                 for statement in _tables(dims).values():
                     connection.execute(statement)
-                rows = _with_checksums(_about_rows({"dims": dims, **about}, n_rows))
+                rows = _with_checksums(_about_rows(about, n_rows))
                 connection.executemany("INSERT INTO about VALUES (?, ?, ?)", rows)
         except sqlite3.Error as error:
             raise OSError(f"{path} cannot be written: {error}") from error
@@ -223,13 +223,13 @@ class Record:
         statements = dict(self._connection.execute("SELECT name, sql FROM sqlite_schema").fetchall())
         if not statements:
             raise RunError("it is still empty")
-        self.about: dict[str, Any] = {name: json.loads(value) for name, value in self.rows("about")}
-        self._n_rows = self.about.pop("rows")
-        c, p, t = self.about["dims"]
+        c, p, t = (statements.get("events", "").count(f" {name}_") for name in ("context", "theta", "outcome"))
         self.dims: Dims = c, p, t
         tables = _tables(self.dims)  # a viewer may have added an index, a view or statistics
         if {name: statements.get(name) for name in tables} != tables:
-            raise RunError(f"its tables are not those of a record; {HINT}")
+            raise RunError(f"its tables are not those of a record of this version; {HINT}")
+        self.about: dict[str, Any] = {name: json.loads(value) for name, value in self.rows("about")}
+        self._n_rows = self.about.pop("rows")
         last = self._connection.execute("SELECT movement, kind FROM events ORDER BY rowid DESC LIMIT 1").fetchone()
         self.movements = 0 if last is None else movements_after(*last)
 

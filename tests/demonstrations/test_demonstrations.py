@@ -11,7 +11,7 @@ from hypothesis.extra.numpy import arrays
 from sgimd_torch.demonstrations import SHIPPED, load_demonstrations, save_demonstrations
 from sgimd_torch.demonstrations.fit import misfit_of
 from sgimd_torch.environments.fishing_rod import JOINT_RANGES, FishingRod
-from sgimd_torch.runs.tasks.robots import fishing_rod
+from sgimd_torch.runs.tasks.rod import fishing_rod
 from sgimd_torch.runs.tasks.taught import demonstrations_of
 from sgimd_torch.spaces import Demonstration, stream
 

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.environments.check import check_environment
 from sgimd_torch.environments.controllers import Sinusoids
 from sgimd_torch.environments.from_gymnasium import FromGymnasium, measured_noise
@@ -13,7 +12,6 @@ from sgimd_torch.environments.motor_primitives import GaussianPrimitive
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.protocol import SimulationError
 from sgimd_torch.environments.to_gymnasium import ToGymnasium
-from sgimd_torch.session import run
 from sgimd_torch.spaces import Box, stream
 
 PUSHES = Box.cube(-1, 1, 2)
@@ -149,25 +147,6 @@ def test_a_start_that_is_seen_and_not_set_is_a_context(world, noise):
     assert elsewhere.execute(starts[0], still, stream(0, "any")).tolist() == ends[0].tolist()  # as after --resume
     with pytest.raises(ValueError, match=r"context \[0.0, 0.0\] is never observed: .* can be seen, not set"):
         robot.execute(np.zeros(2), still, stream(0, "any"))
-
-
-def test_the_pendulum_learns_from_starts_that_it_sees():
-    world = gymnasium.make("Pendulum-v1")
-    robot = FromGymnasium(
-        world,
-        GaussianPrimitive(Box(world.action_space.low, world.action_space.high), (1.0, 5.0)),
-        steps=100,
-        outcome=lambda observations: [np.arctan2(*observations[-1][1::-1])],
-        outcomes=Box.cube(-np.pi, np.pi, 1, names=("angle",), unit="rad"),
-        rest=[0.0],
-        outcome_noise=0.0,
-        contexts=Box.cube(-1.01, 1.01, 3),
-        context=lambda first: first / [1, 1, 8],
-    )
-    check_environment(robot)
-    learner = practice(robot, 0)
-    outcomes = [episode.outcome for episode in run(learner, robot, 0, movements=20)]
-    assert np.ptp(outcomes) > 1
 
 
 def test_the_noise_of_resets_is_measured():

@@ -173,12 +173,6 @@ def test_a_thing_that_trembles_at_rest_was_not_moved(here):
     check_environment(robot)
 
 
-def test_a_recording_is_translated_to_the_movement_that_was_recorded(here):
-    robot = MujocoRobot("arm.xml", outcome="site:tip:xy", n_knots=6, **CORNERS)
-    theta = robot.policies.sample(stream(0, "x"))
-    assert robot.correspondence(*robot.primitive.trajectory(theta)) == pytest.approx(theta, abs=1e-6)
-
-
 @pytest.mark.parametrize("options", [{}, {"displacement": True}])
 def test_the_arm_is_drawn_from_its_base_to_the_outcome(here, options):
     robot = MujocoRobot("arm.xml", outcome="site:tip:xy", **CORNERS, **options)
@@ -286,21 +280,6 @@ def test_a_slip_is_told_in_one_line(here, options, said):
     with pytest.raises(ValueError, match=re.escape(said)) as raised:
         MujocoRobot(**{"model": "arm.xml", "outcome": "site:tip:xy", **options})
     assert "\n" not in str(raised.value)
-
-
-def test_a_model_of_the_menagerie_needs_its_name_alone(here, monkeypatch):
-    pytest.importorskip("mujoco_menagerie", reason="needs the package mujoco-menagerie, which no extra installs")
-    monkeypatch.setenv("MENAGERIE_ROOT", str(here / "menagerie"))
-    (here / "menagerie/robotstudio_so101").mkdir(parents=True)
-    for name in ("arm.xml", "tooth.obj"):
-        scene = here / "menagerie/robotstudio_so101" / name.replace("arm", "scene")
-        scene.write_text((here / name).read_text())
-    robot = MujocoRobot("menagerie:robotstudio_so101", outcome="site:tip:xy", **CORNERS)
-    assert [path.name for path in robot.files] == ["scene.xml", "tooth.obj"]
-    with pytest.raises(ValueError, match=r"model menagerie:robotstudio_so10: Unknown robot .* Did you mean"):
-        MujocoRobot("menagerie:robotstudio_so10", outcome="site:tip:xy")
-    with pytest.raises(ValueError, match="model menagerie:aloha: 'aloha' not found"):
-        MujocoRobot("menagerie:aloha", outcome="site:tip:xy")
 
 
 def test_without_the_package_the_menagerie_is_refused_with_what_to_install(here, monkeypatch):

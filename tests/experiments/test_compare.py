@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compare import RUN, collect, compared, last_rows, main, runs_of
+from compare import KEY, collect, compared, last_rows, main, runs_of
 from made_up import row
 from runs import ROOT, start
 from sgimd_torch.demonstrations import load_demonstrations
@@ -88,18 +88,6 @@ def test_each_evaluation_is_a_row_the_failed_are_reported_and_a_second_start_doe
     assert [path.read_bytes() for path in tmp_path.glob("results/*.csv")] == contents
 
 
-def test_shards_share_out_the_runs(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    wanted = ["paper", "model", "--seeds", "0-1", "--results", ".", "--dry-run"]
-    parts = []
-    for shard in ("1/1", "1/3", "2/3", "3/3"):
-        assert command(main, [*wanted, "--shard", shard]) == 0
-        parts.append(capsys.readouterr().out.splitlines())
-    whole, *parts = parts
-    assert sorted(line for part in parts for line in part) == sorted(whole)
-    assert all(len(part) < len(whole) for part in parts)
-
-
 def test_a_run_that_lost_its_rows_is_collected_again_and_no_goal_is_counted_twice(go, benchmark, tmp_path):
     name = "sgim-d-large"
     parts = {"environment.task_space": 100.0}
@@ -109,7 +97,7 @@ def test_a_run_that_lost_its_rows_is_collected_again_and_no_goal_is_counted_twic
     paths = [tmp_path / "results.csv", tmp_path / "explored.csv"]
 
     def collected():
-        known = {*read_table(tmp_path)[RUN].itertuples(index=False, name=None)}
+        known = {*read_table(tmp_path)[KEY].itertuples(index=False, name=None)}
         before = last_rows(config) <= known
         collect(config, tmp_path)
         return before

@@ -6,12 +6,14 @@ import pytest
 from sgimd_torch import load_life, save_life, session
 from sgimd_torch.algorithms.practice import practice, practice_taught
 from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.learner import Learner
 from sgimd_torch.learner.events import Kind
+from sgimd_torch.parts import Strategy
 from sgimd_torch.record import Record
 from sgimd_torch.session import NoOutcomeError, run
-from sgimd_torch.spaces import Failure, stream
+from sgimd_torch.spaces import Failure, Move, stream
 from sgimd_torch.teachers import PeriodicTeacher, at_once
-from worlds import NO_CONTEXT, demonstrations, last_posture, make
+from worlds import NO_CONTEXT, demonstrations, last_posture, make, problem
 
 ARM = PlanarArm(5, noise=0.01)
 SHOWN = demonstrations(ARM)
@@ -94,6 +96,25 @@ def test_attempts_that_began_in_another_order_than_the_robots_are_replayed_in_th
     save_life(learner, tmp_path / "life.sqlite")
     load_life(again, tmp_path / "life.sqlite")
     assert np.array_equal(again.memory.thetas, learner.memory.thetas)
+
+
+class Dozing(Strategy):
+    """Draws a theta, rests, and then makes this movement."""
+
+    def attempt(self, context):
+        theta = self.problem.policies.sample(self.problem.stream("dozing"))
+        yield None
+        yield Move(theta, None, "dozing")
+
+
+def test_an_attempt_whose_rest_has_failed_is_begun_again_in_a_replay(tmp_path):
+    learner, again = (Learner(each, Dozing(each)) for each in (problem(), problem()))
+    learner.ask_many([NO_CONTEXT])
+    learner.tell_many([Failure("lost")])
+    save_life(learner, tmp_path / "life.sqlite")
+    load_life(again, tmp_path / "life.sqlite")
+    thetas = [[each.ask(NO_CONTEXT), each.ask(NO_CONTEXT).theta.tolist()] for each in (learner, again)]
+    assert thetas[0] == thetas[1]
 
 
 def test_a_robot_that_fails_ends_its_own_attempt_alone():

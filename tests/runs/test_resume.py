@@ -173,7 +173,7 @@ def copy(tmp_path, undisturbed):
     [
         ("UPDATE events SET outcome_0 = 0.5 WHERE movement = 40 AND kind = 'moved'", "of events is not what was"),
         ("DELETE FROM regions WHERE rowid > 1", "regions has 1 rows, .* were written"),
-        ("UPDATE about SET value = '[1]' WHERE name = 'settings'", "row 2 of about"),
+        ("UPDATE about SET value = '[1]' WHERE name = 'settings'", "row 1 of about"),
         (bytes(8192), "cannot be read as a record"),
     ],
 )

@@ -1,6 +1,6 @@
 """Tasks: a task is an environment with benchmark goals, demonstrations and a correspondence to translate them.
 
-``robots.py`` has the tasks of the catalogue. A function of your own can return a task:
+``robots.py`` and ``rod.py`` have the tasks of the catalogue. A function of your own can return a task:
     def make(): return Task(Toss(), benchmark=my_goals, demonstrations=Path("shown.npz"), correspondence=translate)
 """
 

@@ -1,51 +1,20 @@
-"""The robots of the catalogue as tasks. Benchmark goals and demonstrations do not depend on the seed of a run."""
+"""Planar arms as tasks. Benchmark goals and demonstrations do not depend on the seed of a run."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
-from sgimd_torch.demonstrations import SHIPPED as SHIPPED_DEMONSTRATIONS
-from sgimd_torch.demonstrations import load_demonstrations
-from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.evaluation import SHIPPED as SHIPPED_BENCHMARK
 from sgimd_torch.evaluation import Benchmark, tile_goals
-from sgimd_torch.options.signature import with_keywords_of
 from sgimd_torch.runs.tasks import Task, grid_over
-from sgimd_torch.spaces import Box, Demonstration, stream
+from sgimd_torch.spaces import Demonstration, stream
 
 SIDE: Final = 0.1  # m, side of a benchmark tile; the disc of radius 1 m that an arm reaches has 311 goals
 N_DEMONSTRATIONS: Final = 127  # number of an arm's demonstrations, equal to that of the rod's demonstrators
 N_SAMPLES: Final = 5  # number of samples in the trajectory of an arm's demonstration
-
-
-@with_keywords_of(FishingRod, "noise", "max_wind")
-def fishing_rod(*, task_space: float = 1.0, threads: int = 1, **physics: Any) -> Task:
-    """Arm with a fishing rod, in MuJoCo: the paper's task.
-
-    Demonstrations and benchmark goals are those of the paper's rod without wind, in the context 0 of a rod in the wind.
-
-    Args:
-        task_space: half side (m) of T, a square; 100 in the paper's large-space experiment.
-        threads: number of threads of an evaluation; results do not depend on this number.
-
-    Raises:
-        ValueError: a number is out of its range.
-    """
-    if not task_space > 0:
-        raise ValueError(f"task_space must be above 0, got {task_space}; it is a length in metres")
-    space = Box.cube(-task_space, task_space, 2, names=("x", "y"), unit="m")
-    rod = FishingRod(outcomes=space, threads=threads, **physics)
-
-    def without_wind() -> list[Demonstration]:
-        return [replace(demonstration, context=np.zeros(rod.contexts.dim)) for demonstration in load_demonstrations()]
-
-    demonstrations = without_wind if rod.contexts.dim else SHIPPED_DEMONSTRATIONS
-    return Task(rod, SHIPPED_BENCHMARK, demonstrations, rod.primitive.correspondence)
 
 
 def planar_arm(*, n_joints: int) -> Task:
