@@ -115,10 +115,6 @@ class Config:
         """
         return self.values[name]
 
-    def __contains__(self, name: object) -> bool:
-        """Whether this run has such an option."""
-        return name in self.values
-
     @cached_property
     def chosen(self) -> dict[str, Part]:
         """Parts of the run, by name; the run itself is the part ""."""
@@ -156,7 +152,7 @@ class Config:
     def with_found(self, options: Mapping[str, Any]) -> Self:
         """These settings, with options that the robot has found by movements, such as the corners of T."""
         parts = {f"environment.{name}": value for name, value in options.items()}
-        return replace(self, parts={**dict(self.parts), **{name: parts[name] for name in parts if name in self}})
+        return replace(self, parts={**dict(self.parts), **{name: parts[name] for name in parts if name in self.values}})
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -210,11 +206,6 @@ class Config:
     def due(self, movements: int, numbers: Iterable[int]) -> bool:
         """Whether one of ``numbers`` falls into the group of robots that ended after this number of ``movements``."""
         return any(0 <= movements - number < self.at_once for number in numbers)
-
-    @property
-    def floors(self) -> tuple[int, ...]:
-        """Numbers of movements at which an evaluation measures the noise."""
-        return (self.movements,) if self.floor_at is None else self.floor_at
 
     def _unknown(self, name: str) -> ValueError:
         """The error for an option that this run does not have."""

@@ -75,7 +75,8 @@ class Evaluations:
         """
         parts, config = self.parts, self.parts.config
         where = parts.environment, parts.benchmark.goals, config.seed, movements
-        repeats = config.repeats if config.due(movements, config.floors) else 0
+        floors = (config.movements,) if config.floor_at is None else config.floor_at
+        repeats = config.repeats if config.due(movements, floors) else 0
         own = evaluate(parts.inverses[OWN], *where, repeats=repeats, between=self.between)
         evaluations = {OWN: own}
         for name, inverse in parts.inverses.items():

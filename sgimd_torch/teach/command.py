@@ -108,6 +108,6 @@ def options_of(argv: Sequence[str]) -> tuple[Config, int]:
         return config, options.port
     words = [f"--name={NAME}", f"--algorithm={LEARNER}", "--repeats=0", *words]
     config, _ = parse(words)
-    if "teacher" in config:
+    if "teacher" in config.values:
         config, _ = parse([f"--teacher={BY_HAND}", *words])
     return with_found_earlier(config), options.port

@@ -1,4 +1,4 @@
-"""Anchored predictions: exact at executed movements, the network's far away, and doubted in between."""
+"""Anchored predictions: exact at executed movements, the network's far away, and uncertain in between."""
 
 import copy
 
@@ -34,16 +34,12 @@ def predict(near, thetas):
         return [part.numpy() for part in near.predict(near.tensor(thetas))]
 
 
-def test_at_an_anchor_the_prediction_is_its_outcome(model, memory, fixed):
+def test_at_an_anchor_the_prediction_is_its_outcome_and_near_it_changes_as_the_network_says(model, memory, fixed):
     fixed(share=0.0)
-    rows = np.arange(20)
     for n in (20, 1):
-        near = anchored(model, memory, rows[:n])
+        near = anchored(model, memory, np.arange(n))
         assert np.linalg.norm(network(model, memory.thetas[:n])[0] - memory.outcomes[:n], axis=1).max() > 0.01
         np.testing.assert_allclose(predict(near, memory.thetas[:n])[0], memory.outcomes[:n], atol=2e-3)
-
-
-def test_near_an_anchor_the_landing_point_changes_as_the_network_says(model, memory, fixed):
     fixed(share=0.0, reach=1.0)
     near, theta = anchored(model, memory, [0]), memory.thetas[0]
     thetas = theta + 0.02 * stream(0, "steps").standard_normal((10, 7))
@@ -115,16 +111,12 @@ def test_each_candidate_has_its_own_anchors(model, memory):
 def test_an_anchor_counts_in_its_own_context_and_the_candidate_in_its_own(fixed):
     fixed(share=0.0)
     model = ForwardModel(1, 7, 2)  # untrained, but the context matters
-    theta, here, there = np.full((1, 1, 7), 0.5), np.array([0.3]), np.array([[[-0.3]]])
-    near = Anchored(model, ARM.policies, here, there, theta, np.array([[[0.4, 0.2]]]))
-    landing = {float(c[0]): network_in(model, c, theta[0]) for c in (here, there[0, 0])}
-    assert np.abs(landing[0.3] - landing[-0.3]).max() > 0.01
-    np.testing.assert_allclose(predict(near, theta[0])[0], [0.4, 0.2] + landing[0.3] - landing[-0.3], atol=1e-3)
-
-
-def network_in(model, context, thetas):
+    theta, contexts = np.full((1, 7), 0.5), np.array([[0.3], [-0.3]])
+    near = Anchored(model, ARM.policies, contexts[0], contexts[None, 1:], theta[None], np.array([[[0.4, 0.2]]]))
     with torch.no_grad():
-        return model.landing(torch.tensor(context).float(), torch.tensor(thetas).float())[0].mean(dim=0).numpy()
+        ours, anchors = (model.landing(*map(model.tensor, (c, theta)))[0].mean(dim=0).numpy() for c in contexts)
+    assert np.abs(ours - anchors).max() > 0.01
+    np.testing.assert_allclose(predict(near, theta)[0], ours - anchors + np.array([0.4, 0.2]), atol=1e-3)
 
 
 def test_the_gradient_of_the_expected_distance_equals_finite_differences(model, memory):
@@ -159,17 +151,13 @@ def test_the_gradient_is_finite_at_the_goal_itself_and_at_an_anchor(model, memor
 BOX = Box(np.array([0.0, -1.0, 10.0, 0.0, 0.0, 0.0, 0.0]), np.array([1.0, 1.0, 30.0, 1.0, 1.0, 1.0, 0.01]))
 
 
-def in_sides(change):
-    return np.sqrt(((change / BOX.sides) ** 2).mean(axis=-1))
-
-
 def test_the_trust_region_ends_at_its_radius_and_near_points_are_left_alone():
     rng = stream(0, "points")
     start = BOX.low + BOX.sides * rng.random((50, 7))
     far, near = (start + size * BOX.sides * rng.uniform(-1, 1, (50, 7)) for size in (1.0, 0.1))
     tensors = [torch.tensor(values) for values in (start, far, near, BOX.sides)]
     kept = within(tensors[0], tensors[1], tensors[3], 0.1).numpy()
-    np.testing.assert_allclose(in_sides(kept - start), 0.1)
+    np.testing.assert_allclose(np.sqrt((((kept - start) / BOX.sides) ** 2).mean(axis=1)), 0.1)
     scale = (kept - start) / (far - start)
     np.testing.assert_allclose(scale, np.broadcast_to(scale[:, :1], scale.shape), rtol=1e-6)  # straight towards it
     torch.testing.assert_close(within(tensors[0], tensors[2], tensors[3], 0.1), tensors[2])

@@ -166,7 +166,7 @@ def test_what_a_part_is_anyway_is_no_difference():
     assert Config("practice-taught", parts={"goals": "within-reach", "budget": 1}) == own
     assert words(own) == ["--algorithm=practice-taught"]
     assert words(replace(own, parts={"goals": "interest-map"}))[1:] == ["--goals=interest-map"]
-    assert "goals.window" not in own
+    assert "goals.window" not in own.values
     assert own["movements"] == 5000
 
 

@@ -9,6 +9,7 @@ from scipy.optimize import minimize, rosen
 
 from sgimd_torch.options.catalogue import WORDS
 from sgimd_torch.options.signature import options_of
+from sgimd_torch.searches.explore import Returning
 from sgimd_torch.searches.perturb import Perturb, Vary
 from sgimd_torch.searches.simplex import NelderMead, simplex_descent
 from sgimd_torch.spaces import Array, Box, Estimate, stream
@@ -122,13 +123,6 @@ def test_an_incomplete_simplex_stays_in_the_flat_of_its_vertices_and_still_meets
     assert min(world.distance(theta) for theta in executed) < 1e-3
 
 
-def test_the_simplex_ends_on_the_goal_where_nothing_is_random() -> None:
-    world = World(dim=4, k=2)
-    executed = world.run(simplex_search(world.problem()))
-    assert 5 < len(executed) < 300  # it ended by itself
-    assert min(world.distance(theta) for theta in executed) < 1e-3
-
-
 @pytest.fixture(params=[word for word in WORDS["search"] if word != "gradient"])  # it needs a forward model
 def make(request):
     """Every search, as wide as it can be."""
@@ -165,6 +159,7 @@ def test_an_estimate_outside_of_the_policy_space_is_refused(make) -> None:
         *((NelderMead, {"step": step}) for step in (0.0, 0.6, np.nan)),
         *((NelderMead, {"noise": noise}) for noise in (-0.1, 0.6, np.nan)),
         *((make, {"sd": sd}) for make in (Perturb, Vary) for sd in (0.0, np.nan)),
+        (Returning, {"first": -1}),
     ],
 )
 def test_numbers_out_of_range_are_refused(make, options) -> None:
@@ -205,21 +200,16 @@ def test_a_simplex_begun_in_a_corner_steps_inwards_and_is_not_flat(corner: float
     )  # mirrored, not clipped
 
 
-def test_perturb_executes_a_new_theta_first_but_not_a_remembered_one() -> None:
-    world = World(dim=3, k=4)
-    search = Perturb(world.problem())
-    assert np.array_equal(world.run(search, n=1)[0], world.theta)
-    world.theta = world.thetas[1]
-    assert not (world.run(search, n=1)[0] == world.thetas).all(axis=1).any()
-
-
-def test_perturb_follows_the_best_it_has_executed() -> None:
+def test_perturb_executes_a_new_theta_first_and_then_varies_the_best_so_far() -> None:
     world = World(dim=3, k=2)
     executed = world.run(Perturb(world.problem(), sd=1e-6), n=50)
+    assert np.array_equal(executed[0], world.theta)
     for i in range(1, 50):
-        so_far = min((*executed[:i], *world.thetas), key=world.distance)
-        assert np.linalg.norm(executed[i] - so_far) < 1e-5
+        best = min((*executed[:i], *world.thetas), key=world.distance)
+        assert np.linalg.norm(executed[i] - best) < 1e-5
     assert world.distance(executed[-1]) < world.distance(executed[0])
+    world.theta = world.thetas[1]  # remembered, so its outcome is known
+    assert not (world.run(Perturb(world.problem()), n=1)[0] == world.thetas).all(axis=1).any()
 
 
 def test_in_a_corner_of_a_small_box_the_simplex_is_not_flat() -> None:

@@ -6,6 +6,8 @@ from viser.transforms import SO3
 
 from sgimd_torch import FishingRod, MujocoRobot, PlanarArm
 from sgimd_torch.runs.tasks import Task
+from sgimd_torch.spaces import Box
+from sgimd_torch.teach.chart import Chart, picture_of
 from sgimd_torch.teach.command import serving
 from sgimd_torch.teach.leading import Leading
 from sgimd_torch.teach.led import hand_led_of
@@ -63,6 +65,13 @@ def test_the_map_lies_where_outcomes_are(server, model, outcome, options, low, h
     scene = scene_of(server, MujocoRobot(model, outcome=outcome, **{**PUCK, **options}))
     assert corners(scene) == pytest.approx(np.array([low, high]), abs=1e-6)
     assert scene._goals.points[0] == pytest.approx(low, abs=0.01)
+
+
+def test_the_picture_of_the_map_is_light_where_an_outcome_came_near_with_y_upwards():
+    distances = np.full((60, 60), 9.0)
+    distances[50, 10] = 0.0  # y is large, x is small
+    picture = picture_of(Chart(distances, 9.0, np.zeros(0, dtype=bool)), Box.cube(0, 1, 2)).sum(axis=2)
+    assert np.unravel_index(picture.argmax(), picture.shape) == (9, 10)
 
 
 def test_a_strip_is_the_map_of_one_dimension(server, model):

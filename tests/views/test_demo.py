@@ -73,6 +73,7 @@ def test_a_second_start_uses_what_is_there_and_fewer_movements_are_refused(shown
 def test_options_of_a_run_are_those_of_all_three():
     configs = configs_of(["--seed", "4", "--movements=70", "--environment.noise", "0"])
     assert [*configs] == [*LEARNERS]
-    given = {(config.seed, config["environment.noise"], config.movements, config.floors) for config in configs.values()}
+    runs = configs.values()
+    given = {(config.seed, config["environment.noise"], config.movements, config.floor_at) for config in runs}
     assert given == {(4, 0.0, 70, ())}  # the noise floor would take a tenth of the time
     assert {config.out for config in configs_of([]).values()} == {Path("runs/demo")}
