@@ -125,14 +125,6 @@ def test_the_numbers_of_a_run_are_those_of_its_evaluations(pages, run):
     assert errors["physics (ms)"] == f"{1000 * run.summary['seconds_physics'] / 60:.2f}"
 
 
-def test_the_numbers_of_a_variant_are_interquartile_means_over_its_seeds(pages, runs):
-    seeds = [read_run(runs / "sgim-d" / f"seed-00{seed}") for seed in (3, 4)]
-    errors = np.array([each.at(60) for each in seeds])
-    row = next(row for row in rows_of(pages["many"], "Errors") if row[0] == "SGIM-D")
-    assert row[1:3] == ["2", "60"]
-    assert row[3] == f"{interquartile_mean(errors):.3f}"
-
-
 def test_a_run_that_has_hardly_begun_is_reported_and_one_that_was_never_evaluated_comes_last(run, tmp_path):
     nothing = {name: column[:0] for name, column in run.evaluations["own"].items()}
     begun = replace(
