@@ -63,7 +63,7 @@ class GoalBabbling(Strategy):
         ValueError: a number is out of its range, or a part is of another kind.
     """
 
-    draws_from = "regime"
+    draws_from = "regime"  # choice of a global or a local movement; a stream keeps its name
 
     def __init__(
         self,
@@ -159,7 +159,7 @@ class GoalBabbling(Strategy):
         share = self.explore.share  # read once, because each read looks for effects
         if share is not None:
             return share
-        # Deviation: the paper's probability is -J. Here it is clipped, so that both regimes are always possible.
+        # Deviation: the paper's probability is -J. Here it is clipped, so that both kinds are always possible.
         least, greatest = self.global_range
         return min(max(-self.competence(context, goal), least), greatest)
 
