@@ -4,8 +4,6 @@ Each kind of run is made once. While it is made, the living learner is asked wha
 movements and at the end. Then each command opens the run.
 """
 
-import csv
-import io
 import sys
 from dataclasses import replace
 from types import SimpleNamespace
@@ -26,7 +24,7 @@ from sgimd_torch.runs.signals import command
 from sgimd_torch.spaces import stream
 from sgimd_torch.teach.command import options_of
 from sgimd_torch.teach.taught import ALONE, TaughtRun
-from sgimd_torch.views import ask, benchmark
+from sgimd_torch.views import benchmark
 from sgimd_torch.views.film import command as film
 from sgimd_torch.views.report import command as report
 from worlds import executed
@@ -175,15 +173,6 @@ def test_the_loaded_learner_is_the_one_that_lived(run):
     learner = load_learner(run.path, trust=True)
     np.testing.assert_array_equal(answers_of(replace(run.parts, learner=learner)), run.answers)
     assert learner.movements == run.parts.learner.movements
-
-
-def test_ask_gives_the_movements_of_the_learner_that_lived(run, tmp_path):
-    (tmp_path / "goals.csv").write_text("\n".join(f"{x},{y}" for x, y in GOALS))
-    words = [str(run.path), "--trust", f"--goals={tmp_path}/goals.csv", f"--out={tmp_path}/answers.csv"]
-    assert command(ask.main, words) == 0
-    rows = list(csv.DictReader(io.StringIO((tmp_path / "answers.csv").read_text())))
-    thetas = [[float(row[f"theta_{k}"]) for k in range(run.answers.shape[1])] for row in rows]
-    np.testing.assert_array_equal(thetas, run.answers)
 
 
 @pytest.mark.parametrize("run", some("taught", "prior", "noticed change", "forward model"), indirect=True)
