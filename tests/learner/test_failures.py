@@ -199,7 +199,7 @@ def test_a_run_whose_robot_is_broken_says_how_to_go_on_and_does(robots: Path, ca
 
 
 def test_three_failures_are_told_and_later_ones_only_counted_also_in_evaluations(robots: Path, capsys) -> None:
-    assert command(main, words("worse", "--evaluate-at", "[]", "--movements", "20")) == 0
+    assert command(main, words("worse", "--evaluate-at", "20", "--movements", "20")) == 0
     printed = capsys.readouterr()
     assert "movements of the evaluation failed" in printed.out
     assert read_run(robots / "worse" / "practice" / "seed-003").summary["failed"] == 11
