@@ -1,7 +1,7 @@
-"""Every command that reads a run finds the learner that lived it, whatever happened in the run.
+"""Whoever opens a run finds the learner that lived it, whatever happened in the run.
 
 Each kind of run is made once. While it is made, the living learner is asked what it would do at three goals, after 30
-movements and at the end. Then each command opens the run.
+movements and at the end. Then the run is opened in every way.
 """
 
 import sys
