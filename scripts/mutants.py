@@ -38,7 +38,7 @@ interest by the oldest goals of a region | goals/regions.py | goals/test_regions
     competences[-window:] ==> competences[:window]
 eq. (4): the least interest is not subtracted | goals/regions.py | goals/test_interest.py
     interests - interests.min() ==> interests
-modes 1 and 2 have each other's probability | goals/regions.py | goals/test_interest.py
+modes 1 and 2 have each other's probability | goals/interest_map.py | goals/test_interest.py
     (0.7, 0.2, 0.1) ==> (0.2, 0.7, 0.1)
 split one goal too early | goals/interest_map.py | goals/test_interest.py
     <= self.g_max: ==> < self.g_max:

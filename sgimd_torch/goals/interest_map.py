@@ -31,11 +31,16 @@ class InterestMap(Goals):
         g_max: largest number of goals in a region; with one more goal, the region is split.
         window: number of recent competences in eq. (3), the paper's zeta; even, at least 4, at most ``g_max``.
         cuts: number of candidate cuts of a region in each dimension.
-        near: largest distance from a region's goal of least competence at which the paper's mode 3 draws a new goal,
-            relative to the region's sides.
+        modes: probabilities of the paper's three modes: a goal where interest is high (1), anywhere in T (2), or near a
+            goal of least competence (3). The paper gives no numbers.
+        near: largest distance from a region's goal of least competence at which mode 3 draws a new goal, relative to
+            the region's sides.
         max_aspect: ratio of two sides of a region, relative to C x T, beyond which the shorter side is not cut.
             Deviation: the paper has no such rule (inf). Without it, regions become very thin when most goals lie in a
             small part of a large space.
+        balanced: true: a cut scores its contrast times the numbers of goals on both sides; false: its contrast alone.
+            Deviation: true is the default, the paper's is false. Then the best cut often leaves a handful of goals on
+            one side.
         progress: measure of progress: `gained_progress`; `absolute_progress`, which is eq. (3); or a function of
             your own.
         contrast: function (region, mask of the goals below a cut) -> difference between the two sides of the cut.
@@ -51,8 +56,10 @@ class InterestMap(Goals):
         g_max: int = 30,
         window: int = 24,
         cuts: int = 20,
+        modes: tuple[float, float, float] = (0.7, 0.2, 0.1),
         near: float = 0.05,
         max_aspect: float = 5.0,
+        balanced: bool = True,
         progress: Progress = gained_progress,
         contrast: Callable[[Region, NDArray[np.bool_]], float] = interest_difference,
     ) -> None:
@@ -61,8 +68,10 @@ class InterestMap(Goals):
             raise ValueError(f"window must be even, from 4 to g_max={g_max}, got {window}")
         if cuts < 1 or not max_aspect >= 1:
             raise ValueError(f"needs cuts >= 1 and max_aspect >= 1, got {cuts} and {max_aspect}")
-        self.g_max, self.cuts, self.max_aspect, self.contrast = g_max, cuts, max_aspect, contrast
-        self._tiling = Tiling(problem, partial(interest_of, window=window, progress=progress), near=near)
+        self.g_max, self.cuts, self.max_aspect = g_max, cuts, max_aspect
+        self.balanced, self.contrast = balanced, contrast
+        interest = partial(interest_of, window=window, progress=progress)
+        self._tiling = Tiling(problem, interest, modes=modes, near=near)
 
     @property
     def regions(self) -> list[Region]:
@@ -109,10 +118,10 @@ class InterestMap(Goals):
             self._tiling.tile([*regions[:index], *region.split(*best_cut), *regions[index + 1 :]])
 
     def _best_cut(self, region: Region) -> tuple[int, float] | None:
-        """Axis and position of the cut with the largest n1 * n2 * contrast; None when no cut is valid.
+        """Axis and position of the cut with the largest contrast, times the numbers of goals on both sides if the map is
+        balanced.
 
-        Deviation: the paper maximises the difference of the interests, `contrast`, alone. Without the numbers of goals
-        n1 and n2 on both sides, the best cut often leaves a handful of goals on one side.
+        None when no cut is valid.
         """
         n, side = len(region.points), region.high - region.low
         shares = np.arange(1, self.cuts + 1) / (self.cuts + 1)
@@ -129,7 +138,8 @@ class InterestMap(Goals):
             balance = int(n_below[candidate]) * (n - int(n_below[candidate]))
             # If all cuts score 0, for example because all competences are -1, the longest side is halved. Progress that
             # begins in a small part of a large space is only visible in a small region.
-            return balance * self.contrast(region, below), float(relative_sides[candidate[1]]), balance
+            weight = balance if self.balanced else 1
+            return weight * self.contrast(region, below), float(relative_sides[candidate[1]]), balance
 
         candidates = [(int(row), int(axis)) for row, axis in np.argwhere(valid)]
         if not candidates:

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,8 +19,6 @@ from sgimd_torch.goals.uniform import check_attempt, check_in
 from sgimd_torch.parts import Problem
 from sgimd_torch.spaces import Array, Box
 
-# Probabilities of the paper's modes: a goal where interest is high (1), anywhere (2), where competence is least (3).
-_MODES: Final = (0.7, 0.2, 0.1)
 Progress = Callable[[Array, Array, Array], float]
 """Function (points, competences, gains) of n >= 4 goals, oldest first -> progress. Points ``(n, dim)`` of C x T are
 contexts and goals. Competences ``(n,)`` and gains ``(n,)`` are arguments of `Goals.add`, one for each goal."""
@@ -149,18 +146,24 @@ class Tiling:
     Args:
         problem: problem to learn.
         interest_function: function (points, competences, gains) -> interest of a region.
-        near: largest distance from a region's goal of least competence at which the paper's mode 3 draws a new goal,
-            relative to the region's sides.
+        modes: probabilities of the paper's modes: a goal where interest is high (1), anywhere (2), where competence is
+            least (3).
+        near: largest distance from a region's goal of least competence at which mode 3 draws a new goal, relative to
+            the region's sides.
 
     Raises:
         ValueError: a number is out of its range.
     """
 
-    def __init__(self, problem: Problem, interest_function: Progress, *, near: float) -> None:
+    def __init__(
+        self, problem: Problem, interest_function: Progress, *, modes: tuple[float, float, float], near: float
+    ) -> None:
+        if len(modes) != 3 or not (min(modes) >= 0 and abs(sum(modes) - 1) < 1e-9):
+            raise ValueError(f"modes must be three probabilities with the sum 1, got {modes}")
         if not 0 < near <= 1:
             raise ValueError(f"near must lie in (0, 1], got {near}; it is a fraction of a region's sides")
-        self.problem, self._near, self._rng = problem, near, problem.stream("goals")
-        self._interest_function = interest_function
+        self.problem, self._modes, self._near = problem, modes, near
+        self._interest_function, self._rng = interest_function, problem.stream("goals")
         contexts, outcomes = problem.contexts, problem.outcomes
         self.box = Box(np.concatenate((contexts.low, outcomes.low)), np.concatenate((contexts.high, outcomes.high)))
         self.tile([self._empty_region("R", self.box.low, self.box.high)])
@@ -188,7 +191,7 @@ class Tiling:
     def sample(self, context: ArrayLike) -> Array:
         """Decide a goal, section 3.2.2: choose a mode, a region that contains the context, and a goal in it."""
         context = check_in(self.problem.contexts, "context", context)
-        mode = 1 + self._rng.choice(3, p=_MODES)
+        mode = 1 + self._rng.choice(3, p=self._modes)
         if mode == 2:
             return self.problem.outcomes.sample(self._rng)
         region = self._choose(context)

@@ -26,6 +26,7 @@ class LocalInverse(Inverse):
         dist_n: radius of a neighbourhood in Pi, the paper's distN; None: the paper's .6 in its 25
             dimensions, and 0.6 sqrt(theta_dim / 25) in others, because distances grow with sqrt(theta_dim).
         alpha: weight of the standard deviation of outcomes in a neighbourhood; their distance to the goal has weight 1.
+        variance: true: the variance takes the place of the standard deviation, as the paper prints it.
         width: width of the Gaussian of eq. (9), relative to the mean distance of the neighbourhood's outcomes from the
             goal. A wide Gaussian averages the neighbourhood; a narrow one follows the exemplar nearest to the goal.
 
@@ -43,13 +44,14 @@ class LocalInverse(Inverse):
         k_max: int = 10,
         dist_n: float | None = None,
         alpha: float = 0.5,
+        variance: bool = False,
         width: float = 0.25,
     ) -> None:
         if not width > 0:
             raise ValueError(f"width must be positive, got {width}; it is relative to the mean distance to the goal")
         super().__init__(problem)
         self.memory = problem.memory
-        self.h_max, self.k_max, self.alpha, self.width = h_max, k_max, alpha, width
+        self.h_max, self.k_max, self.alpha, self.variance, self.width = h_max, k_max, alpha, variance, width
         self.dist_n = 0.6 * np.sqrt(problem.policies.dim / 25) if dist_n is None else dist_n
 
     def __call__(self, context: Array, goal: Array) -> Estimate:
@@ -68,7 +70,7 @@ class LocalInverse(Inverse):
         near = near_goal(self.memory, context, goal, self.h_max)  # H of eq. (8), by distances of context and outcome
         padded = self.memory.neighbourhoods(near, self.k_max, self.dist_n)  # -1 fills lists with fewer than k_max rows
         neighbourhoods = [rows[rows >= 0] for rows in padded]  # K_h of eq. (8)
-        spreads = _spreads(self.memory.outcomes, neighbourhoods)
+        spreads = _spreads(self.memory.outcomes, neighbourhoods) ** (2 if self.variance else 1)
         unreliability = distances_to(self.memory.outcomes[near], goal) + self.alpha * spreads
         return neighbourhoods[int(unreliability.argmin())]
 
