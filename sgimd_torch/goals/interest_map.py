@@ -118,11 +118,8 @@ class InterestMap(Goals):
             self._tiling.tile([*regions[:index], *region.split(*best_cut), *regions[index + 1 :]])
 
     def _best_cut(self, region: Region) -> tuple[int, float] | None:
-        """Axis and position of the cut with the largest contrast, times the numbers of goals on both sides if the map is
-        balanced.
-
-        None when no cut is valid.
-        """
+        """Axis and position of the cut with the largest contrast, if the map is balanced times the numbers of goals on
+        both sides; None when no cut is valid."""
         n, side = len(region.points), region.high - region.low
         shares = np.arange(1, self.cuts + 1) / (self.cuts + 1)
         positions = np.quantile(region.points, shares, axis=0)  # (cuts, dim)
