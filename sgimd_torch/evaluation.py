@@ -50,11 +50,11 @@ class Benchmark:
         Raises:
             ValueError: its class or its outcome dimensions differ, or goals lie outside its T.
         """
-        found = type(environment).__name__
-        if found != self.environment or environment.outcomes.dim != self.goals.shape[1]:
+        name = type(environment).__name__
+        if name != self.environment or environment.outcomes.dim != self.goals.shape[1]:
             raise ValueError(
                 f"the benchmark was made for the class {self.environment} ({self.goals.shape[1]} outcome dimensions), "
-                f"got {found} ({environment.outcomes.dim}); sgimd benchmark makes another one"
+                f"got {name} ({environment.outcomes.dim}); sgimd benchmark makes another one"
             )
         space = environment.outcomes
         if not space.contains(self.goals).all():
@@ -198,7 +198,7 @@ def evaluate(
         given = environment.contexts.check("context", context)
         contexts = np.broadcast_to(given, (len(goals), environment.contexts.dim))
     answers = inverse.answer_many(contexts, goals)
-    thetas, expected = np.stack([each.theta for each in answers]), expected_errors(answers, goals)
+    thetas, expected = np.stack([answer.theta for answer in answers]), expected_errors(answers, goals)
     copies = np.tile(thetas, (1 + repeats, 1))  # repeats come last, so that errors do not depend on their number
     landed = _landed(environment, np.tile(contexts, (1 + repeats, 1)), copies, seed, f"evaluation {step}", between)
     landed = landed.reshape(1 + repeats, *goals.shape)
@@ -214,7 +214,7 @@ def evaluate(
 
 def expected_errors(answers: Sequence[Estimate], goals: Array) -> Array:
     """Expected errors ``(n,)`` of answers to ``goals`` ``(n, outcome_dim)``; NaN: not known."""
-    return np.array([each.expected_error(goal) for each, goal in zip(answers, goals, strict=True)])
+    return np.array([answer.expected_error(goal) for answer, goal in zip(answers, goals, strict=True)])
 
 
 def _landed(

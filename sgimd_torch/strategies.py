@@ -63,7 +63,7 @@ class GoalBabbling(Strategy):
         ValueError: a number is out of its range, or a part is of another kind.
     """
 
-    draws_from = "regime"
+    draws_from = "regime"  # choice of a global or a local movement; a stream keeps its name
 
     def __init__(
         self,
@@ -159,7 +159,7 @@ class GoalBabbling(Strategy):
         share = self.explore.share  # read once, because each read looks for effects
         if share is not None:
             return share
-        # Deviation: the paper's probability is -J. Here it is clipped, so that both regimes are always possible.
+        # Deviation: the paper's probability is -J. Here it is clipped, so that both kinds are always possible.
         least, greatest = self.global_range
         return min(max(-self.competence(context, goal), least), greatest)
 
@@ -176,12 +176,14 @@ class GoalBabbling(Strategy):
 
 
 class Mimic(Social):
-    """Imitate a policy, section 4.2: execute theta_d exactly, then with small variations.
+    """Imitate a policy, section 4.2: execute theta_d, exactly at first, then with small variations.
 
     Args:
         problem: problem to learn.
         repeats: number of movements for one demonstration; None: keep imitating until the next demonstration.
         epsilon: largest variation of each parameter, in the unit of the parameter.
+        exact_first: true: the first movement is theta_d itself, so its outcome is known; false: all are varied.
+            Deviation: the paper varies all.
         draws_from: name of the random stream of the variations.
 
     Raises:
@@ -194,13 +196,14 @@ class Mimic(Social):
         *,
         repeats: int | None = 10,
         epsilon: float = 0.05,
+        exact_first: bool = True,
         draws_from: str = "imitate",
     ) -> None:
         super().__init__(problem)
         if not 0 <= epsilon < np.inf:
             raise ValueError(f"epsilon must be a bound of variations, finite and >= 0, got {epsilon}")
         self.repeats = repeats if repeats is None else check_count("repeats", repeats, 1)
-        self.epsilon, self.draws_from = epsilon, draws_from
+        self.epsilon, self.exact_first, self.draws_from = epsilon, exact_first, draws_from
 
     def attempt(self, context: Array, theta_d: Array, demonstration: Demonstration) -> Attempt:
         """theta_d, then its variations."""
@@ -209,8 +212,7 @@ class Mimic(Social):
     def repeat(self, theta_d: Array, goal: Array, outcomes: list[Array]) -> Attempt:
         """The movements of an imitation; their outcomes are appended to ``outcomes``."""
         for repeat in range(self.repeats) if self.repeats is not None else itertools.count():
-            # Deviation: the paper varies all repeats. Here the first is exact and shows the outcome of theta_d itself.
-            theta = theta_d if repeat == 0 else self._vary(theta_d)
+            theta = theta_d if repeat == 0 and self.exact_first else self._vary(theta_d)
             outcomes.append((yield Move(theta, goal, "imitate")))
 
     def _vary(self, theta_d: Array) -> Array:
@@ -226,10 +228,14 @@ class Imitate(Mimic):
         problem: problem to learn, with the goal babbling of the learner.
         repeats: number of movements for one demonstration; None: keep imitating until the next demonstration.
         epsilon: largest variation of each parameter, in the unit of the parameter.
+        exact_first: true: the first movement is theta_d itself, so its outcome is known; false: all are varied.
+            Deviation: the paper varies all.
     """
 
-    def __init__(self, problem: Problem, *, repeats: int | None = 10, epsilon: float = 0.05) -> None:
-        super().__init__(problem, repeats=repeats, epsilon=epsilon)
+    def __init__(
+        self, problem: Problem, *, repeats: int | None = 10, epsilon: float = 0.05, exact_first: bool = True
+    ) -> None:
+        super().__init__(problem, repeats=repeats, epsilon=epsilon, exact_first=exact_first)
         self.babbling = _babbling(problem)
 
     def attempt(self, context: Array, theta_d: Array, demonstration: Demonstration) -> Attempt:

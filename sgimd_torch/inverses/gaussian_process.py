@@ -69,7 +69,7 @@ def fit_lengths(inputs: Array, outcomes: Array) -> Array:
 
     def loss(parameters: Array) -> tuple[float, Array]:
         scaled, noise = columns * np.exp(-parameters[:dim, None]), float(np.exp(parameters[dim]))
-        covariance, slopes = kernels.correlations(scaled, _SMOOTH)
+        covariance, slopes = kernels.covariance_matrix(scaled, _SMOOTH)
         covariance.flat[:: len(inputs) + 1] += noise
         # The lower half of an array of C is the upper half of an array of Fortran.
         factor, failed = dpotrf(covariance.T, lower=False, overwrite_a=True)
@@ -106,7 +106,7 @@ def choose_kernel(groups: Sequence[tuple[Array, Array]], noise: float) -> Kernel
     for inputs, outcomes in groups:
         deviations, inputs = outcomes - outcomes.mean(axis=0), np.ascontiguousarray(inputs.T)
         for row, kernel in zip(scores, grid, strict=True):
-            covariance, _ = kernels.correlations(inputs, kernel)
+            covariance, _ = kernels.covariance_matrix(inputs, kernel)
             # Tridiagonal once, so that each noise is cheap: turned by reflections of all movements but the first.
             below, diagonal, beside, lengths, _ = dsytrd(covariance, lower=True)
             others, _, _ = dormqr("L", "T", below[1:, :-1], lengths, deviations[1:], 64 * deviations.shape[1])

@@ -100,7 +100,7 @@ class LocalProcess(Inverse):
         point = (np.concatenate((theta, context)) - self._units[0]) / self._units[1]
         (rows,) = self._inputs.nearest(point[None], _MOST_ALIKE)
         kernels = compiled("sgimd_torch.inverses.kernels")
-        return kernels.foretell(self._inputs.keys.rows, self.memory.outcomes, rows, point, self._kernel)
+        return kernels.fit_and_predict(self._inputs.keys.rows, self.memory.outcomes, rows, point, self._kernel)
 
     def fitted(self) -> FittedKernel | None:
         """What predictions are made from; None while there are too few exemplars, or all outcomes are equal."""

@@ -68,7 +68,7 @@ class Neighbours:
         """
         n, (asked, rows, squared, compared), key = len(self.keys), self._last, query.tobytes()
         if asked != key or rows.shape[1] < min(n, max(k, LISTED)) or not 1 <= k <= n <= EXACT_UP_TO:
-            rows, squared = self._search(query[None], max(k, LISTED) if k > 0 else k)
+            rows, squared = self._search(query[None], max(k, LISTED) if 1 <= k <= n <= EXACT_UP_TO else k)
         elif compared < n:
             rows, squared = rows.copy(), squared.copy()
             _scan().extend(self.keys.rows, query[None], np.array([compared]), np.zeros(1, np.int64), rows, squared)

@@ -263,7 +263,7 @@ def test_whatever_happens_a_learner_that_repeats_the_life_is_the_same(learner, t
     monkeypatch.setattr(session, "JOINS_EVERY", 1)
     run_state_machine_as_test(
         lambda: Lives(learner, teacher),
-        settings=settings(max_examples=6, stateful_step_count=20, deadline=None, derandomize=True, database=None),
+        settings=settings(max_examples=5, stateful_step_count=20, deadline=None, derandomize=True, database=None),
     )
 
 

@@ -18,9 +18,8 @@ side = Neighbours(Table(1, np.arange(5.0)[:, None]))
 print(*side.nearest(np.array([[3.2]]), 2)[0])
 """
 LIFE = """
-from sgimd_torch import practice, run
-from experiments.toys import two_elbows
-robot = two_elbows().environment
+from sgimd_torch import PlanarArm, practice, run
+robot = PlanarArm(3, noise=0.01)
 learner = practice(robot, 1000)
 for _ in run(learner, robot, 1000, movements=300): pass
 print(hash(learner.memory.thetas.tobytes()))
@@ -66,6 +65,28 @@ def test_where_nothing_can_be_written_it_compiles_for_this_process_alone(package
     (tmp_path / "file").touch()
     nowhere = {"HOME": str(tmp_path / "file"), "XDG_CACHE_HOME": str(tmp_path / "file")}
     assert started(package, **nowhere).communicate() == ("3 4\n", SAID)
+
+
+NEAREST = """
+import numpy as np
+from sgimd_torch.memory.compiled import compiled
+outcomes = np.array([[5.0], [1.0]])
+alike, box = np.array([[0], [1]]), np.array([[0.0], [9.0]])
+kernels = compiled("sgimd_torch.inverses.linear_kernel")
+print(kernels.locally_linear(alike, outcomes, outcomes, np.array([1.0]), box)[0])
+"""
+
+
+def test_a_damaged_cache_is_made_again_and_a_change_of_what_compiled_code_calls_takes_effect(package, tmp_path):
+    mine = {"NUMBA_CACHE_DIR": str(tmp_path / "mine")}
+    assert started(package, NEAREST, **mine).communicate() == ("1\n", SAID)
+    for path in [*(tmp_path / "mine").rglob("*.nb?")]:
+        path.write_bytes(path.read_bytes()[:20])
+    assert started(package, NEAREST, **mine).communicate() == ("1\n", SAID)
+    assert started(package, NEAREST, **mine).communicate() == ("1\n", "")
+    called = package / "memory" / "jit.py"
+    called.write_text(called.read_text().replace("total += (one[k] - other[k]) ** 2", "total -= one[k]"))
+    assert started(package, NEAREST, **mine).communicate() == ("0\n", SAID)
 
 
 @pytest.mark.slow
