@@ -109,15 +109,15 @@ class Region:
     def _interest(self) -> float:
         return self.interest_among(slice(None))
 
-    def extend(self, point: Array, competence: float, gain: float, strategy: str) -> Region:
-        """This region with one more goal."""
+    def extend(self, point: Array, competence: ArrayLike, gain: ArrayLike, strategy: ArrayLike) -> Region:
+        """This region with one more goal, or with an array of ``n`` more goals, the oldest first."""
         return replace(
             self,
             points=np.vstack((self.points, point)),
             competences=np.append(self.competences, competence),
             gains=np.append(self.gains, gain),
             strategies=np.append(self.strategies, strategy),
-            attempts=self.attempts + 1,
+            attempts=self.attempts + np.size(competence),
         )
 
     def keep(self, rows: NDArray[np.bool_] | slice) -> Region:
