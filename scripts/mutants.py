@@ -89,7 +89,7 @@ index: of equally near exemplars the newest first | memory/scan.py | memory/test
 index: the radius is squared once | memory/neighbours.py | memory/test_memory.py
     np.where(squared <= within * within, rows, -1) ==> np.where(squared <= within, rows, -1)
 index: a larger k gets the rows of the last query | memory/neighbours.py | memory/test_neighbours.py
-    asked != key or rows.shape[1] < min(n, max(k, LISTED)) or ==> asked != key or
+    last_query != key or rows.shape[1] < min(n, max(k, LISTED)) or ==> last_query != key or
 a Gaussian process with another kernel | inverses/kernels.py | inverses/test_local_process.py
     5 / 3 * distance**2) * decay ==> 5 / 2 * distance**2) * decay
 requests: a teacher without a reply costs nothing | asking/strategy.py | asking/test_asking.py

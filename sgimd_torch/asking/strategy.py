@@ -79,6 +79,6 @@ class StrategicBabbling(ThroughBabbling):
             yield from recording_outcomes(social.attempt(context, *lesson), executed)
         finally:  # also if another demonstration interrupts
             outcomes = [outcome for _, outcome in executed]
-            self.babbling.conclude(context, goal, outcomes, competence_before, strategy)
+            self.babbling.report_competence(context, goal, outcomes, competence_before, strategy)
             if self.problem.outcomes.contains(outcome_d):
-                self.babbling.conclude(context, outcome_d, outcomes, competence_before_d, strategy)
+                self.babbling.report_competence(context, outcome_d, outcomes, competence_before_d, strategy)
