@@ -111,7 +111,7 @@ class GoalBabbling(Strategy):
     def pursue(self, context: Array, goal: Array, strategy: str = "autonomous") -> Attempt:
         """Pursue ``goal`` until it is reached or given up, the budget is spent, or a demonstration interrupts."""
         outcomes: list[Array] = []
-        before = best = self.competence(context, goal)
+        competence_before = best = self.competence(context, goal)
         moves = self._explore(context, goal)
         move = next(moves)
         try:
@@ -120,27 +120,29 @@ class GoalBabbling(Strategy):
                 outcomes.append(outcome)
                 if len(outcomes) == self.budget or np.linalg.norm(outcome - goal) <= self.tolerance:
                     return
-                last, best = best, self.competence(context, goal)
-                if best <= last and best < self.give_up:
+                previous, best = best, self.competence(context, goal)
+                if best <= previous and best < self.give_up:
                     return
                 move = moves.send(outcome)
         finally:  # interruption by a demonstration included
-            self.conclude(context, goal, outcomes, before, strategy)
+            self.report_competence(context, goal, outcomes, competence_before, strategy)
 
-    def conclude(self, context: Array, goal: Array, outcomes: list[Array], before: float, strategy: str) -> None:
-        """Tell the goal model the result of an attempt, unless the attempt had no movement.
+    def report_competence(
+        self, context: Array, goal: Array, outcomes: list[Array], competence_before: float, strategy: str
+    ) -> None:
+        """Tell the goal model the competence now, and its rise during an attempt, unless the attempt had no movement.
 
         Args:
             outcomes: outcomes ``(outcome_dim,)`` of the attempt.
-            before: competence at the goal when the attempt began.
+            competence_before: competence at the goal when the attempt began.
             strategy: name of the strategy that chose the goal: "autonomous", "social" or another name.
         """
         if outcomes:
             judged, after = self.judge(context, goal, np.stack(outcomes)), self.competence(context, goal)
             # The new nearest exemplar in (context, outcome) may be farther in outcome alone; this is no loss.
-            gain = max(0.0, after - before)
+            gain = max(0.0, after - competence_before)
             if gain == 0 and judged != after:  # the judge rates the attempt alone, which may be worse than the memory
-                gain = min(0.0, judged - before)
+                gain = min(0.0, judged - competence_before)
             self.goals.add(context, goal, judged, strategy, gain)
 
     def _explore(self, context: Array, goal: Array) -> Attempt:
@@ -245,11 +247,11 @@ class Imitate(Mimic):
             yield from super().attempt(context, theta_d, demonstration)
             return
         outcomes: list[Array] = []
-        before = self.babbling.competence(context, goal)
+        competence_before = self.babbling.competence(context, goal)
         try:
             yield from self.repeat(theta_d, goal, outcomes)
         finally:  # interruption by the next demonstration included
-            self.babbling.conclude(context, goal, outcomes, before, "social")
+            self.babbling.report_competence(context, goal, outcomes, competence_before, "social")
 
 
 class Emulate(Social):

@@ -180,53 +180,45 @@ def test_a_run_is_evaluated_by_its_own_inverse_and_by_the_one_that_answers_for_a
     assert last_rows(wanted["sgim-d-letter"]) == {("sgim-d-letter", 0, 5000, answer) for answer in ("paper", "process")}
 
 
-IN_OPTIONS = {  # the letter of the paper, spelled out
-    "inverse": "paper",
-    "search.noise": 0.0,
-    "search.complete": True,
-    "search.xatol": 1e-4,
-    "search.fatol": 1e-4,
-    "goals.progress": "absolute",
-    "goals.g_max": 50,
-    "goals.max_aspect": 1e9,
-    "budget": 60,
-    "give_up": -1.0,
-    "global_range": (0.0, 1.0),
-}
-FIRST = {"social.exact_first": False}
-ARM = {"environment": "planar-arm-7", "teacher.every": 20}
+LETTER = (  # spelled out
+    "inverse=paper goals.progress=absolute goals.g_max=50 goals.max_aspect=1e9 search.noise=0 search.complete=true "
+    "search.xatol=1e-4 search.fatol=1e-4 budget=60 give_up=-1 global_range=0,1"
+)
+BOUNDS = {"global_range": (0.05, 0.95), "social.exact_first": True}
 
 
-def movements_of(config, learner=None):
-    parts = build(config)
-    episodes = run(learner or parts.learner, parts.environment, config.seed, movements=60, teacher=parts.teacher)
+def arm_life(algorithm, learner_of=None, **options):
+    """Movements of an arm."""
+    arm = {"environment": "planar-arm-7", "teacher.every": 20, "seed": 3}
+    parts = build(Config.from_settings({"algorithm": algorithm, **arm, **options}))
+    learner = learner_of(parts.environment) if learner_of else parts.learner
+    episodes = run(learner, parts.environment, 3, movements=60, teacher=parts.teacher)
     return np.stack([episode.move.theta for episode in episodes])
 
 
-def test_the_letter_is_one_word_for_eleven_options():
-    spelled = {"sgim-d": IN_OPTIONS | FIRST, "sagg-riac": IN_OPTIONS}
-    for algorithm, options in spelled.items():
-        letter = Config(f"{algorithm}-letter").values
-        assert letter == Config(algorithm, parts=options).values | {"algorithm": f"{algorithm}-letter"}
-    movements = movements_of(Config("sgim-d-letter", parts=ARM))
-    assert np.array_equal(movements, movements_of(Config("sgim-d", parts=IN_OPTIONS | FIRST | ARM)))
-    arm = build(Config("sgim-d-letter", parts=ARM)).environment
-    in_python = sgim_d_letter(arm, 0, correspondence=arm.correspondence)
-    assert np.array_equal(movements, movements_of(Config("sgim-d-letter", parts=ARM), in_python))
+def test_the_letter_is_one_word_for_twelve_options():
+    spelled = dict(option.split("=") for option in LETTER.split())
+    letter, varied = Config("sagg-riac-letter").values, {"social.exact_first": "false"}
+    assert letter == Config.from_settings({"algorithm": "sagg-riac", **spelled}).values | {
+        "algorithm": letter["algorithm"]
+    }
+    life = arm_life("sgim-d-letter")
+    assert np.array_equal(life, arm_life("sgim-d", **spelled, **varied))
+    in_python = arm_life("sgim-d-letter", lambda arm: sgim_d_letter(arm, 3, correspondence=arm.correspondence))
+    assert np.array_equal(life, in_python)
+    bounded = arm_life("sgim-d-letter", **BOUNDS)
+    assert np.array_equal(bounded, arm_life("sgim-d", **{**spelled, **BOUNDS}))
+    assert not np.array_equal(bounded, life)
 
 
 def test_rows_of_the_letter_are_the_algorithm_with_two_bounds(go, tmp_path):
-    """The rows in results/ were made with them, so the command that makes a row names them."""
-    bounds = {"global_range": (0.05, 0.95), "social.exact_first": True}
     (config,) = runs_of(["letter"], ["sgim-d-letter"], [3], tmp_path)
-    assert (config.algorithm, dict(config.parts)) == ("sgim-d-letter", bounds)
-    movements = movements_of(replace(config, parts=bounds | ARM))
-    assert np.array_equal(movements, movements_of(Config("sgim-d", seed=3, parts=IN_OPTIONS | bounds | ARM)))
-    assert not np.array_equal(movements, movements_of(Config("sgim-d-letter", seed=3, parts=ARM)))
+    assert (config.algorithm, dict(config.parts)) == ("sgim-d-letter", BOUNDS)
     options = ("--algorithm", "sgim-d-letter", "--global-range", "0.05,0.95", "--social.exact-first", "true")
     arm = ("--environment", "planar-arm-7", "--teacher.every", 20, "--movements", 60, "--evaluate-at", "[]")
     assert go(tmp_path, *options, *arm, "--benchmark", "null") == 0
-    assert np.array_equal(movements, read_run(tmp_path / "sgim-d-letter" / "seed-003").thetas)
+    lived = read_run(tmp_path / "sgim-d-letter" / "seed-003").thetas
+    assert np.array_equal(lived, arm_life("sgim-d-letter", **BOUNDS))
 
 
 def test_a_corner_is_twenty_neighbours_and_many_are_the_first(tmp_path):

@@ -75,12 +75,6 @@ def test_each_mode_alone_draws_its_own_goals():
     assert near.max() <= 0.01 * (last.high[0] - last.low[0])
 
 
-@pytest.mark.parametrize("modes", [(0.5, 0.2, 0.1), (1.2, -0.2, 0.0), (0.5, 0.5), (np.nan, 0.5, 0.5)])
-def test_modes_are_three_probabilities_with_the_sum_one(modes):
-    with pytest.raises(ValueError, match=r"modes must be three probabilities with the sum 1, got \("):
-        InterestMap(problem(outcomes=LINE), modes=modes)
-
-
 def test_goals_are_uniform_in_every_context_while_all_interests_are_equal():
     goals = InterestMap(problem(contexts=LINE, outcomes=LINE, seed=3), near=1.0)  # a whole region is near its worst
     for context, goal in stream(3, "planted").uniform(size=(400, 2)) ** [2, 3]:
