@@ -29,7 +29,7 @@ from sgimd_torch.record.saving import load_life, save_life
 from sgimd_torch.rivals.alp_gmm import AlpGmm
 from sgimd_torch.rivals.cma_es import CmaEs
 from sgimd_torch.rivals.quality_diversity import cma_me, map_elites
-from sgimd_torch.runs.directory import FILE
+from sgimd_torch.runs.directory import RUN_FILE
 from sgimd_torch.runs.read import config_of, read_run
 from sgimd_torch.runs.signals import command
 from sgimd_torch.session import run
@@ -427,7 +427,7 @@ def test_the_file_of_a_run_is_loaded_by_a_learner_of_a_program_of_ones_own(tmp_p
         assert command(main, options) == 0
     run_of_50, run_of_70 = (read_run(tmp_path / f"{movements}/run/seed-004") for movements in (50, 70))
     parts = build(config_of(run_of_50))
-    load_life(parts.learner, run_of_50.path / FILE, teacher=parts.teacher)
+    load_life(parts.learner, run_of_50.path / RUN_FILE, teacher=parts.teacher)
     more_movements = {"movements": 70, "teacher": parts.teacher, "teachers": parts.teachers}
     episodes = list(run(parts.learner, parts.environment, 4, **more_movements))
     assert [episode.move and episode.move.theta.tolist() for episode in episodes] == [

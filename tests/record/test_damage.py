@@ -10,7 +10,7 @@ from runs import edit
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.options.command_line import main
 from sgimd_torch.record import Record, RunError, layout
-from sgimd_torch.runs.directory import FILE
+from sgimd_torch.runs.directory import RUN_FILE
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.signals import command
 from sgimd_torch.spaces import stream
@@ -136,7 +136,7 @@ def test_no_damage_of_a_run_with_all_tables_reads_as_something_else(tmp_path):
     save_benchmark(tmp_path / "toss.npz", Benchmark("Toy", np.array([[0.5, 0.5], [1.0, 0.5], [0.8, 0.2]]), 0.1))
     words = [*ALL.split(), *SHORT.split(), "--benchmark", str(tmp_path / "toss.npz"), "--name", "run"]
     assert command(main, [*words, "--out", str(tmp_path)]) == 0
-    whole = tmp_path / "run/seed-000" / FILE
+    whole = tmp_path / "run/seed-000" / RUN_FILE
     content = read(whole)
     assert all(content.values())
     for k in range(1000):

@@ -10,7 +10,7 @@ from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.options.command_line import main
 from sgimd_torch.record.saving import save_life
-from sgimd_torch.runs.directory import FILE
+from sgimd_torch.runs.directory import RUN_FILE
 from sgimd_torch.runs.load import load_learner
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.signals import command
@@ -28,7 +28,7 @@ def past(tmp_path_factory):
     """The record of a run on the arm of seven joints."""
     out = tmp_path_factory.mktemp("past")
     assert go(out, "--movements", 120) == 0
-    return out / "practice/seed-000" / FILE
+    return out / "practice/seed-000" / RUN_FILE
 
 
 def table(path, past, names=("context", "theta", "outcome")):
@@ -69,9 +69,9 @@ def other(tmp_path, past, how):
                 )
                 == 0
             )
-            return tmp_path / "toss/practice/seed-000" / FILE, "of context, theta, outcome, this robot has"
+            return tmp_path / "toss/practice/seed-000" / RUN_FILE, "of context, theta, outcome, this robot has"
         case "unit" | "bounds":
-            path = tmp_path / FILE
+            path = tmp_path / RUN_FILE
             path.write_bytes(past.read_bytes())
             spaces = read_run(past.parent).spaces
             told = {name: [box.low.tolist(), box.high.tolist(), box.names, box.unit] for name, box in spaces.items()}
@@ -80,7 +80,7 @@ def other(tmp_path, past, how):
             write_about(tmp_path, spaces=told)
             return path, "are in mm, here in m" if how == "unit" else "policies of"
         case "damaged":
-            path = tmp_path / FILE
+            path = tmp_path / RUN_FILE
             path.write_bytes(past.read_bytes())
             edit(path, "UPDATE events SET outcome_0 = 0.5 WHERE rowid = 9")
             return path, "row 9 of events is not what was written"
