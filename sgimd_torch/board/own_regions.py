@@ -27,7 +27,7 @@ class OwnRegions:
     """
 
     def __init__(self, problem: Problem) -> None:
-        self._problem, self._whole = problem, Tiling(problem, INTEREST, near=1.0)
+        self._problem, self._whole = problem, Tiling(problem, INTEREST, modes=(0, 1, 0), near=1)
         self._n_added, self.regions = 0, list[Region]()  # no regions before the first goal
 
     def follow(self, behaviour: Behaviour) -> None:
