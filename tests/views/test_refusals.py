@@ -10,7 +10,7 @@ from own import MODULE
 from sgimd_torch.__main__ import _call
 from sgimd_torch.options.command_line import main as live
 from sgimd_torch.record import Record
-from sgimd_torch.runs.directory import FILE
+from sgimd_torch.runs.directory import RUN_FILE
 from sgimd_torch.runs.signals import command
 
 REFUSALS = Path(__file__).parent / "refusals.txt"
@@ -37,8 +37,8 @@ def place(tmp_path_factory):
         words = f"--algorithm random --repeats 0 --environment sliders:{words} --out {folder}/{out}"
         assert command(live, words.split()) == 0
     (folder / "unborn/seed-000").mkdir(parents=True)
-    with Record(folder / "runs/random/seed-000" / FILE) as whole:
-        Record.make(folder / "unborn/seed-000" / FILE, whole.dims, whole.about).close()
+    with Record(folder / "runs/random/seed-000" / RUN_FILE) as whole:
+        Record.make(folder / "unborn/seed-000" / RUN_FILE, whole.dims, whole.about).close()
     shutil.copytree(folder / "mixed/random", folder / "damaged/random")
     file = folder / "damaged/random/seed-000/run.sqlite"
     content = bytearray(file.read_bytes())
