@@ -304,7 +304,7 @@ def test_without_evaluations_there_are_curves_of_the_learners_own_goals_and_of_f
     assert command(main, words.split()) == 0
     curves, goals = curves_of(directory), read_run(directory).own_goals()
     for movements in (50, 100, 150):
-        assert curves["goals/missed_by"][movements] == pytest.approx(np.median(goals.recent(movements)))
+        assert curves["goals/missed_by"][movements] == pytest.approx(np.median(goals.recent_misses(movements)))
     assert not any(tag.startswith("error/") for tag in curves)
     assert hparams_of(directory)[1] == ["goals/missed_by"]
 

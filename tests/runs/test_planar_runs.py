@@ -11,7 +11,7 @@ from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.options.catalogue import WORDS
 from sgimd_torch.options.command_line import main
-from sgimd_torch.runs.directory import FILE
+from sgimd_torch.runs.directory import RUN_FILE
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.signals import command
 from sgimd_torch.runs.tasks.robots import arm_benchmark, arm_demonstrations
@@ -46,7 +46,7 @@ def test_every_algorithm_lives_and_writes_a_whole_run_directory(tmp_path, few, c
     assert live(tmp_path, "--environment", environment, "--algorithm", algorithm, "--benchmark", few) == 0
     directory = tmp_path / algorithm / "seed-003"
     assert f"{directory}: 70 movements, mean error" in capsys.readouterr().out
-    assert [path.name for path in directory.iterdir()] == [FILE]
+    assert [path.name for path in directory.iterdir()] == [RUN_FILE]
     run = read_run(directory)
     assert run.index.tolist() == list(range(70))
     assert run.thetas.shape == (70, ARMS[environment])

@@ -17,7 +17,7 @@ from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.sketch import Sketch
 from sgimd_torch.options import command_line
 from sgimd_torch.record import Record
-from sgimd_torch.runs.directory import FILE
+from sgimd_torch.runs.directory import RUN_FILE
 from sgimd_torch.runs.signals import command
 from sgimd_torch.spaces import Box, stream
 from sgimd_torch.views import check
@@ -167,8 +167,8 @@ def test_an_interrupted_film_leaves_the_old_one_and_nothing_else(tmp_path):
 def test_a_run_without_movements_is_refused(run_path, tmp_path, capsys):
     empty = tmp_path / run_path.name
     empty.mkdir()
-    with Record(run_path / FILE) as whole:
-        Record.make(empty / FILE, whole.dims, whole.about).close()
+    with Record(run_path / RUN_FILE) as whole:
+        Record.make(empty / RUN_FILE, whole.dims, whole.about).close()
     assert command(film.main, [str(empty)]) == 2
     assert "has no movements yet" in capsys.readouterr().err
 

@@ -168,10 +168,10 @@ def test_a_run_without_evaluations_is_judged_by_its_own_goals(run, tmp_path):
         summary={**run.summary, "movements": 6, "failed": 1},
     )
     variant = Variant("sgim-d", [alone])
-    assert variant.own.movements.tolist() == list(range(7))
-    assert variant.own.missed[0, 1:] == pytest.approx([0.01, 0.01, 0.055, 0.055, 0.1, 0.1])
-    assert variant.own.met[0, 1:] == pytest.approx([1, 1, 1 / 2, 1 / 2, 1 / 3, 1 / 3])
-    assert variant.own.failed[0, 1:] == pytest.approx([0] * 5 + [1 / 6])
+    assert variant.own_goals.movements.tolist() == list(range(7))
+    assert variant.own_goals.missed[0, 1:] == pytest.approx([0.01, 0.01, 0.055, 0.055, 0.1, 0.1])
+    assert variant.own_goals.met[0, 1:] == pytest.approx([1, 1, 1 / 2, 1 / 2, 1 / 3, 1 / 3])
+    assert variant.own_goals.failed[0, 1:] == pytest.approx([0] * 5 + [1 / 6])
     made = page(tmp_path, [variant])
     assert "missed the last 50 goals that it chose by 0.100 m (median), and met 33% of them within 0.02 m." in made
     assert alts(made) == ["Own goals of SGIM-D", "Landing points of SGIM-D"]
