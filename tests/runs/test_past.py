@@ -109,11 +109,3 @@ def test_a_file_that_is_no_past_of_this_robot_is_refused(past, tmp_path, capsys)
         ("missing.csv", "cannot be read"),
     ):
         refused(tmp_path / name, said, tmp_path / "out", capsys)
-
-
-@pytest.mark.parametrize("options", [("--inverse", "nearest"), ("--evaluated-by", "own,model")])
-def test_a_learner_that_cannot_begin_again_begins_with_nothing(options, past, tmp_path, capsys):
-    assert go(tmp_path / "out", *options, "--begin-with", past) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert "prior (--begin-with) needs an inverse model that says how sure it is" in line
-    assert not (tmp_path / "out").exists()
