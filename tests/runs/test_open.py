@@ -4,6 +4,8 @@ Each kind of run is made once. While it is made, the living learner is asked wha
 movements and at the end. Then the run is opened in every way.
 """
 
+import csv
+import io
 import sys
 from dataclasses import replace
 from types import SimpleNamespace
@@ -24,7 +26,7 @@ from sgimd_torch.runs.signals import command
 from sgimd_torch.spaces import stream
 from sgimd_torch.teach.command import options_of
 from sgimd_torch.teach.taught import ALONE, TaughtRun
-from sgimd_torch.views import benchmark
+from sgimd_torch.views import ask, benchmark, table
 from sgimd_torch.views.film import command as film
 from sgimd_torch.views.report import command as report
 from worlds import executed
@@ -175,6 +177,15 @@ def test_the_loaded_learner_is_the_one_that_lived(run):
     assert learner.movements == run.parts.learner.movements
 
 
+def test_ask_gives_the_movements_of_the_learner_that_lived(run, tmp_path):
+    (tmp_path / "goals.csv").write_text("\n".join(f"{x},{y}" for x, y in GOALS))
+    words = [str(run.path), "--trust", f"--goals={tmp_path}/goals.csv", f"--out={tmp_path}/answers.csv"]
+    assert command(ask.main, words) == 0
+    rows = list(csv.DictReader(io.StringIO((tmp_path / "answers.csv").read_text())))
+    thetas = [[float(row[f"theta_{k}"]) for k in range(run.answers.shape[1])] for row in rows]
+    np.testing.assert_array_equal(thetas, run.answers)
+
+
 @pytest.mark.parametrize("run", some("taught", "prior", "noticed change", "forward model"), indirect=True)
 def test_a_film_shows_the_learner_that_lived_early_and_at_the_end(run, tmp_path, capsys):
     goal, last = ",".join(map(str, GOALS[0])), run.parts.learner.movements
@@ -207,6 +218,19 @@ def test_a_resumed_run_has_the_learner_that_lived_and_the_board_its_errors(run):
         life.commit()
     np.testing.assert_array_equal(answers_of(parts), run.answers)
     assert curves_of(run.path)["error/mean"][parts.learner.movements] == pytest.approx(run.error, rel=1e-6)
+
+
+def test_the_table_shows_the_error_of_the_learner_that_lived(run, capsys):
+    assert command(table.main, [str(run.path), "--format=csv"]) == 0
+    (row,) = csv.DictReader(io.StringIO(capsys.readouterr().out))
+    (error,) = (float(value) for name, value in row.items() if name.startswith("error"))
+    assert error == run.error
+
+
+@pytest.mark.parametrize("run", some("plain", "failures"), indirect=True)
+def test_the_report_shows_the_error_of_the_learner_that_lived(run):
+    assert command(report.main, [str(run.path)]) == 0
+    assert f">{run.error:.3f}<" in (run.path / "report.html").read_text()
 
 
 def test_a_change_is_said_recorded_and_reported_once(files, tmp_path, capsys):
