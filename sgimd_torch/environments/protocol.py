@@ -76,16 +76,6 @@ class BatchEnvironment(Environment, Protocol):
 
 
 @runtime_checkable
-class RobotCount(Protocol):
-    """An environment that cannot make any number of movements at once, such as the driver of a single robot."""
-
-    @property
-    def at_once(self) -> int:
-        """Largest number of movements at once."""
-        ...
-
-
-@runtime_checkable
 class Translating(Protocol):
     """An environment that can translate demonstrations."""
 

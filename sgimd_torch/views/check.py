@@ -33,6 +33,7 @@ import numpy as np
 
 from sgimd_torch.environments.check import check_environment
 from sgimd_torch.environments.protocol import Environment, execute_many
+from sgimd_torch.environments.sketch import traced
 from sgimd_torch.options.build import task_of
 from sgimd_torch.options.command_line import parse
 from sgimd_torch.runs.signals import parser_of
@@ -86,13 +87,13 @@ def _check_picture(task: Task) -> None:
     Raises:
         ValueError: the outcomes differ, or the movement cannot be traced; see `traced`.
     """
-    robot, trace = task.environment, task.picture
-    if trace is None:
+    robot = task.environment
+    if not hasattr(robot, "trace"):
         return
     context, theta = robot.observe(stream(0, "check")), robot.policies.sample(stream(1, "check"))
     outcome = robot.execute(context.copy(), theta.copy(), stream(2, "check"))
     name = type(robot).__name__
-    drawn = trace(context, theta, stream(2, "check")).outcome
+    drawn = traced(robot, context, theta, stream(2, "check")).outcome
     if not np.array_equal(drawn, outcome):
         raise ValueError(
             f"trace() of {name} ends at {drawn.tolist()}, execute() with an equal stream at "

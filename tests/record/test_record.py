@@ -194,7 +194,7 @@ def test_a_reader_that_thinks_for_long_keeps_no_lock_and_sees_one_state(tmp_path
         before = list(reader.rows("events"))
         writer.add(moved([0.1, 0.2, 0.3]))
         writer.replace_rows("goals", [(0, 0.5, 0.5)])
-        assert writer.commit(wait=False)
+        assert writer.commit()
         assert list(reader.rows("events")) == before
 
 
@@ -207,9 +207,9 @@ def test_a_commit_that_another_program_holds_up_is_made_later_and_nothing_is_los
         for k in range(3):
             record.add(moved([0.1, 0.2, k]))
             record.about["seconds"] = k
-            assert not record.commit(wait=False)
+            assert not record.commit()
         viewer.close()
-        assert record.commit(wait=False)
+        assert record.commit()
         record.add(moved([0.1, 0.2, 9.0]))
         record.commit()
     with Record(path) as record:
