@@ -77,7 +77,7 @@ def traced(environment: Any, context: Array, theta: Array, rng: np.random.Genera
     except Exception as error:  # code of the user may raise anything
         raise ValueError(f"trace() of {name} failed: {type(error).__name__}: {error}") from error
     if hasattr(movement, "states"):  # the RodTrace of the fishing rod, or a Filmed
-        return movement  # type: ignore[no-any-return]
+        return movement
     if not isinstance(movement, Sketch) or len(movement.outcome) != dim:
         what = f"one of {len(movement.outcome)}" if isinstance(movement, Sketch) else type(movement).__name__
         wanted = f"a Sketch with an outcome of {dim} dimension{'s' * (dim != 1)}"

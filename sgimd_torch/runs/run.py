@@ -14,7 +14,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, Final, Protocol, Self
 
-from sgimd_torch.environments.protocol import FAILURES, SimulationError
+from sgimd_torch.environments.protocol import FAILURES, SimulationError, reason_of
 from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.learner.events import Event, Kind
 from sgimd_torch.options.build import RunParts
@@ -23,7 +23,7 @@ from sgimd_torch.runs.at_once import executing
 from sgimd_torch.runs.directory import open_run
 from sgimd_torch.runs.evaluations import Evaluations, ends_now
 from sgimd_torch.runs.signals import Failed, Progress, Stopped, Stopping, say
-from sgimd_torch.session import NoOutcomeError, reason_of, run
+from sgimd_torch.session import NoOutcomeError, run
 from sgimd_torch.spaces import Episode
 
 N_TOLD: Final = 3  # number of failures with a message each; later ones are only counted

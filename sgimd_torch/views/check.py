@@ -39,7 +39,7 @@ from sgimd_torch.options.command_line import parse
 from sgimd_torch.runs.signals import parser_of
 from sgimd_torch.runs.tasks import Task, benchmark_of
 from sgimd_torch.runs.tasks.taught import demonstrations_of
-from sgimd_torch.spaces import check_count, stream
+from sgimd_torch.spaces import Failure, check_count, stream
 from sgimd_torch.views.demonstrations import check
 
 TRIED = 20  # number of random movements that estimate the reached part of T
@@ -111,7 +111,10 @@ def _narrow(robot: Environment) -> list[str]:
     """A warning if random movements end outside T, or if their outcomes span a small part of T; [] for none."""
     space, rngs = robot.outcomes, [stream(k, "check") for k in range(TRIED)]
     contexts, thetas = [robot.observe(rng) for rng in rngs], [robot.policies.sample(rng) for rng in rngs]
-    outcomes = execute_many(robot, contexts, thetas, rngs)
+    executed = execute_many(robot, contexts, thetas, rngs)
+    if lost := [outcome.reason for outcome in executed if isinstance(outcome, Failure)]:
+        return [f"{len(lost)} of {TRIED} random movements failed, such as: {lost[0]}"]
+    outcomes = np.array(executed)
     low, high = outcomes.min(axis=0), outcomes.max(axis=0)
     share = float(np.prod((high - low) / space.sides))
     spans = " x ".join(f"[{a:.3g}, {b:.3g}]" for a, b in zip(low, high, strict=True))
