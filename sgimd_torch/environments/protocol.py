@@ -196,7 +196,10 @@ def reason_of(error: BaseException) -> str:
 
 
 def execute_many(
-    environment: Environment, contexts: Sequence[Array], thetas: Sequence[Array], rngs: Sequence[np.random.Generator]
+    environment: Environment,
+    contexts: Sequence[Array] | Array,
+    thetas: Sequence[Array] | Array,
+    rngs: Sequence[np.random.Generator],
 ) -> list[Array | Failure]:
     """The outcome ``(outcome_dim,)`` of each movement, or why it has none; the environment gets copies.
 

@@ -338,11 +338,6 @@ def rewrite(root, name, values):
     pq.write_table(pa.table({**columns, name: values}), last(root))
 
 
-def empty(root):
-    """The last file of a dataset is small, and would fill the memory."""
-    pq.write_table(pa.table({"timestamp": np.zeros(2**25 + 1, np.int8)}), last(root))
-
-
 @pytest.mark.parametrize(
     ("joints", "harm", "message"),
     [
@@ -385,7 +380,6 @@ def empty(root):
         ),
         (STATE, lambda root: rewrite(root, "timestamp", [0.0, None, 2, 3, 4]), r"row \d+: timestamp must be finite"),
         (STATE, lambda root: rewrite(root, STATE, [[[0.0, 1.0], [1.0]]] * 5), "cannot be read: setting an array"),
-        (STATE, empty, r"cannot be read: it would take \d+ bytes"),
         (STATE, lambda root: rewrite(root, STATE, [[True] * 3] * 5), r"state\.list\.element has BOOLEAN, no numbers"),
         (
             STATE,
