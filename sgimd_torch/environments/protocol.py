@@ -214,7 +214,7 @@ def execute_many(
     n, dim = len(thetas), environment.outcomes.dim
     if n > 1 and isinstance(environment, BatchEnvironment):
         try:
-            outcomes = np.asarray(environment.execute_many(np.stack(contexts), np.stack(thetas), rngs))
+            outcomes = np.asarray(environment.execute_many(np.array(contexts), np.array(thetas), rngs))
             if outcomes.shape != (n, dim):
                 raise ValueError(f"execute_many() must give {n} outcomes in rows, ({n}, {dim}), got {outcomes.shape}")
         except (Exception, SystemExit) as error:
