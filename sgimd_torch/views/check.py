@@ -88,7 +88,7 @@ def _check_picture(task: Task) -> None:
         ValueError: the outcomes differ, or the movement cannot be traced; see `traced`.
     """
     robot = task.environment
-    if not hasattr(robot, "trace"):
+    if getattr(robot, "trace", None) is None:
         return
     context, theta = robot.observe(stream(0, "check")), robot.policies.sample(stream(1, "check"))
     outcome = robot.execute(context.copy(), theta.copy(), stream(2, "check"))

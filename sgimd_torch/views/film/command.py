@@ -54,7 +54,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     options = _options(argv)
     run = _opened(options.run, trust=options.trust)
     recorded, parts = run.recorded, run.parts
-    if not hasattr(parts.environment, "trace"):
+    if getattr(parts.environment, "trace", None) is None:
         raise ValueError(
             f"{recorded.path} is of {recorded.config['environment']}, which cannot be filmed: it needs a method "
             "trace(context, theta, rng) -> Sketch"
