@@ -75,14 +75,18 @@ def _spaces(environment: Environment, _: Movements) -> Iterator[str]:
     for name in ("observe", "execute"):
         if not callable(getattr(environment, name, None)):
             yield f"{name} must be a method, got {type(getattr(environment, name, None)).__name__}"
+    noise: Any = getattr(environment, "outcome_noise", None)
+    measured = isinstance(noise, int | float | np.number) and not isinstance(noise, bool) and 0 <= noise < np.inf
+    if not measured:
+        yield f"outcome_noise must be a number >= 0, got {noise!r}; it is the standard deviation of the outcomes"
     rest: Any = getattr(environment, "rest", None)
     if not isinstance(rest, np.ndarray):
         yield f"rest must be an array, the outcome of not moving, got {type(rest).__name__}; np.zeros(2), for example"
-    elif isinstance(getattr(environment, "outcomes", None), Box):
+    elif measured and isinstance(getattr(environment, "outcomes", None), Box):
         try:
             check_robot(environment)
         except ValueError as error:
-            yield str(error)
+            yield f"{error}; rest is the outcome of not moving, one point of T (outcomes)"
 
 
 def _contexts(environment: Environment, _: Movements) -> Iterator[str]:

@@ -113,10 +113,10 @@ USED_TWICE = "changed an array that it gave before: one buffer is used twice"
     [
         (
             with_(rest=np.array([9.0])),
-            r"rest .* is 9.0, outside \[-5.0, 5.0\]",
+            r"rest .* is 9.0, outside \[-5.0, 5.0\].*the outcome of not moving, one point of T",
         ),
         (with_(contexts=(-1, 1)), r"contexts must be a sgimd_torch.Box, got tuple; without contexts it is Box.cube"),
-        (with_(outcome_noise="0.1"), "outcome_noise of the environment must be .*finite and >= 0, got '0.1'"),
+        (with_(outcome_noise="0.1"), "outcome_noise must be a number >= 0, got '0.1'"),
         (with_(observe=lambda own, rng: 3 + own()), r"observe\(\) gave \[.*\], outside C"),
         (OfItsOwn("contexts"), r"observe\(\) gave two contexts for equal streams"),
         (Buffered("context"), rf"observe\(\) {USED_TWICE}"),
