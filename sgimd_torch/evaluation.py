@@ -7,6 +7,7 @@ its movements, and it has random streams of its own.
 
 from __future__ import annotations
 
+import math
 import os
 from bisect import bisect_left
 from collections.abc import Callable, Sequence
@@ -138,7 +139,7 @@ class OwnGoals:
             self.begun.append(index)
             self.missed.append(np.inf)
         self._seen[goal.tobytes()] = place, index
-        self.missed[place] = min(self.missed[place], float(np.linalg.norm(outcome - goal)))
+        self.missed[place] = min(self.missed[place], math.dist(outcome, goal))
 
     def recent(self, movements: int) -> Array:
         """``(n,)``, distances missed at the last 50 goals begun in this number of ``movements``, or fewer."""

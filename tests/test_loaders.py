@@ -151,10 +151,13 @@ def test_a_folder_that_cannot_be_made_is_named(tmp_path):
         ({"side": np.array("1" * 10**6)}, "side"),
     ],
 )
-def test_a_benchmark_that_cannot_be_is_refused_in_few_words(tmp_path, changes, words):
+def test_a_benchmark_that_cannot_be_is_refused_in_few_words_and_not_saved(tmp_path, changes, words):
     path = tmp_path / "goals.npz"
-    goals = {"environment": np.array("PlanarArm"), "goals": np.zeros((3, 2)), "side": np.array(0.1)}
-    write_npz(path, {**goals, **changes})
+    goals = {"environment": np.array("PlanarArm"), "goals": np.zeros((3, 2)), "side": np.array(0.1)} | changes
+    with pytest.raises(ValueError, match=words):
+        save_benchmark(path, Benchmark(**goals))
+    assert not path.exists()
+    write_npz(path, goals)
     with pytest.raises(ValueError, match=rf"goals\.npz: .*{words}") as raised:
         load_benchmark(path)
     assert len(str(raised.value)) < 400

@@ -51,7 +51,7 @@ def test_every_algorithm_lives_and_writes_a_whole_run_directory(tmp_path, few, c
     assert run.index.tolist() == list(range(70))
     assert run.thetas.shape == (70, ARMS[environment])
     assert run.outcomes.shape == (70, 2)
-    mapped = algorithm in ("sagg-riac", "sgim-d") or algorithm.startswith(("sgim-im", "sgim-acts"))
+    mapped = algorithm.startswith(("sagg-riac", "sgim-"))
     assert (run.regions is not None) == mapped
     numbers = ("mean_error", "median_error", "p90_error", "noise_floor", "expected_error", "goals_met")
     assert {*run.evaluation} == {"movements", *numbers}

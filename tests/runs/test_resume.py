@@ -111,18 +111,6 @@ def test_a_run_that_another_process_writes_is_left_alone(tmp_path, go, benchmark
     assert content_of(tmp_path / "sgim-d" / "seed-003") == reference
 
 
-@pytest.mark.parametrize(("algorithm", "end"), [("observation", 50), ("sgim-d", 60)])
-def test_a_finished_run_made_longer_equals_a_long_run(tmp_path, go, algorithm, end):
-    """The long run is not evaluated after 50 movements; after 60 it is, but the noise is not measured there."""
-    options = ("--algorithm", algorithm)
-    assert go(tmp_path / "long", *options) == 0
-    assert go(tmp_path / "extended", *options, "--movements", end) == 0
-    assert go(tmp_path / "extended", *options, "--resume") == 0
-    extended = tmp_path / "extended" / algorithm / "seed-003"
-    assert content_of(extended) == content_of(tmp_path / "long" / algorithm / "seed-003")
-    assert read_run(extended).config["movements"] == MOVEMENTS
-
-
 WHOLE = [(30, 0), (60, 0), (90, 2)]  # numbers of movements before each evaluation, and of its repeats
 WALKS = {  # options of each start of a run, and the evaluations for which it executes movements
     "longer": [("--movements 50", [(30, 0), (50, 2)]), ("", [(60, 0), (90, 2)])],
@@ -160,6 +148,7 @@ def test_a_resumed_run_makes_only_the_evaluations_that_are_missing_or_asked_for(
         assert evaluated == executed
         evaluated.clear()
     assert content_of(tmp_path / "sgim-d" / "seed-003") == reference
+    assert read_run(tmp_path / "sgim-d" / "seed-003").config["movements"] == MOVEMENTS
 
 
 @pytest.fixture
