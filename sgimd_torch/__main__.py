@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from sgimd_torch import __version__
-from sgimd_torch.options.catalogue import WORDS, about, unknown
+from sgimd_torch.options.catalogue import WORDS, about, unknown_name_error
 from sgimd_torch.runs.signals import command, loading
 
 EXTRAS: Final = {
@@ -55,7 +55,7 @@ def _call(words: Sequence[str]) -> int:
         print(f"sgimd_torch {__version__}")
         return 0
     if name not in WORDS["command"]:
-        raise unknown("command", name, WORDS["command"], "; sgimd --help explains the commands")
+        raise unknown_name_error("command", name, WORDS["command"], "; sgimd --help explains the commands")
     try:
         with loading():
             module = importlib.import_module(f"sgimd_torch.{WORDS['command'][name]}")

@@ -141,7 +141,7 @@ class OwnGoals:
         self._seen[goal.tobytes()] = place, index
         self.missed[place] = min(self.missed[place], math.dist(outcome, goal))
 
-    def recent(self, movements: int) -> Array:
+    def recent_misses(self, movements: int) -> Array:
         """``(n,)``, distances missed at the last 50 goals begun in this number of ``movements``, or fewer."""
         until = bisect_left(self.begun, movements)
         return np.array(self.missed[max(0, until - RECENT) : until])

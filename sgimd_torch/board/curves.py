@@ -63,7 +63,7 @@ class Behaviour:
         if self._imitated:
             values["teacher/missed_by"] = float(np.mean(self._imitated))
             self._imitated.clear()
-        missed_by = self.own.recent(self._movements)
+        missed_by = self.own.recent_misses(self._movements)
         if len(missed_by):
             values["goals/reached"] = float((missed_by <= self.tolerance).mean())
             values["goals/missed_by"] = float(np.median(missed_by))

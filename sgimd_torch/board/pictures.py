@@ -79,7 +79,7 @@ def _pixels(picture: Callable[[Axes, Section], object], maps: Sequence[Section])
     """The pixels of a picture with its sections side by side, as large as TensorBoard shows it."""
     size = (4.2 * len(maps), maps[0].height(WIDE) + MARGIN)
     with rc_context(STYLE):
-        figure = Figure(size, dpi=120, layout="constrained")
+        figure = Figure(size, dpi=120, layout="compressed")
         for ax, section in zip(figure.subplots(1, len(maps), squeeze=False).flat, maps, strict=True):
             picture(ax, section)
         canvas: Any = FigureCanvasAgg(figure)

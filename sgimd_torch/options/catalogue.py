@@ -98,7 +98,7 @@ def place_of(kind: str, word: str) -> str:
         meant = f"is it {module}:{name}?" if dot else "or, for code of your own, package.module:attribute"
         if name in ("xml", "urdf"):
             meant = f"for a model file write --environment mujoco --environment.model {word}: docs/how-to/mujoco.md"
-        raise unknown(kind, word, WORDS[kind], f"; {meant}")
+        raise unknown_name_error(kind, word, WORDS[kind], f"; {meant}")
     return word
 
 
@@ -152,7 +152,7 @@ def function_of(make: Callable[..., Any]) -> Callable[..., Any]:
     return function_of(make.func) if isinstance(make, partial) else make
 
 
-def unknown(what: str, word: str, known: Collection[str], also: str = "") -> ValueError:
+def unknown_name_error(what: str, word: str, known: Collection[str], also: str = "") -> ValueError:
     """The error for an unknown ``word``; the message has the nearest ``known`` name, all known names, and ``also``."""
     near = did_you_mean(word, known)
     return ValueError(f"unknown {what} {word!r}{f'{near} Known' if near else '; known'} are {', '.join(known)}{also}")

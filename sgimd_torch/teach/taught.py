@@ -15,7 +15,7 @@ import numpy as np
 
 from sgimd_torch.options.build import build
 from sgimd_torch.options.config import Config
-from sgimd_torch.runs.directory import FILE, holds_run
+from sgimd_torch.runs.directory import RUN_FILE, holds_run
 from sgimd_torch.runs.run import RunLoop
 from sgimd_torch.spaces import Array, Demonstration, stream
 from sgimd_torch.teach.by_hand import BY_HAND, ByHand
@@ -75,7 +75,7 @@ class TaughtRun:
             raise ValueError(ALONE.format(config.algorithm))
         self._hand = ByHand(teacher=parts.teacher)
         self.parts = replace(parts, teacher=self._hand)
-        self._loop = RunLoop(self.parts, resume=holds_run(config.directory / FILE))
+        self._loop = RunLoop(self.parts, resume=holds_run(config.directory / RUN_FILE))
         self._episodes = self._loop.episodes()
         self._lessons = sum(event.kind == "shown" and event.who == BY_HAND for event in self._loop.record.events())
         self._outcomes: deque[Array] = deque(maxlen=LATEST)

@@ -48,14 +48,14 @@ def results(variants: Sequence[Variant]) -> list[Column]:
     unit = unit_of(variants)
 
     def at_last(column: str) -> list[Interval | None]:
-        return [variant.at(variant.last, column) for variant in variants]
+        return [variant.at(variant.compared_at, column) for variant in variants]
 
-    if any(variant.last for variant in variants):
+    if any(variant.compared_at for variant in variants):
         expected = at_last("expected_error")
-        early = [variant.at(EARLY) if variant.last > EARLY else None for variant in variants]
+        early = [variant.at(EARLY) if variant.compared_at > EARLY else None for variant in variants]
         columns = [
             Column("seeds", [Interval(len(variant.used)) for variant in variants], ".0f"),
-            Column("movements", [Interval(variant.last) if variant.last else None for variant in variants], ".0f"),
+            Column("movements", [Interval(at) if (at := variant.compared_at) else None for variant in variants], ".0f"),
             *([Column(unit(f"error at {EARLY}"), early)] if any(early) else []),
             Column(unit("error"), at_last("mean_error")),
             *([Column(unit("expected error"), expected)] if any(expected) else []),
@@ -63,7 +63,7 @@ def results(variants: Sequence[Variant]) -> list[Column]:
             Column(unit("noise floor"), [floor and Interval(floor.value) for floor in at_last("noise_floor")]),
         ]
     else:
-        own = [variant.own for variant in variants]
+        own = [variant.own_goals for variant in variants]
         columns = [
             Column("seeds", [Interval(len(variant.runs)) for variant in variants], ".0f"),
             Column("movements", [Interval(int(curve.movements[-1])) for curve in own], ".0f"),

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
 from sgimd_torch.environments.check import check_environment
+from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.protocol import (
     BatchEnvironment,
@@ -59,8 +60,10 @@ environments = pytest.mark.parametrize(
         PlanarArm(context=True, outcomes=Box.cube(-100, 100, 2)),
         Slope(),
         FastSlope(),
+        FishingRod(),
+        FishingRod(max_wind=0.02),
     ],
-    ids=["arm", "two joints", "noise and context", "large task space", "user's", "user's batches"],
+    ids=["arm", "two joints", "noise and context", "large task space", "user's", "user's batches", "rod", "windy rod"],
 )
 
 

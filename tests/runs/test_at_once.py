@@ -14,7 +14,7 @@ import pytest
 from runs import content_of
 from sgimd_torch.record import Record
 from sgimd_torch.runs.at_once import in_processes
-from sgimd_torch.runs.directory import FILE
+from sgimd_torch.runs.directory import RUN_FILE
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.session import live
 from sgimd_torch.spaces import Failure, stream
@@ -89,7 +89,7 @@ def test_a_run_that_was_stopped_goes_on_to_the_rows_of_a_whole_one(go, own, tmp_
     assert "after 10" not in capfd.readouterr().err  # the evaluation after 100 movements is kept
     found = read_run(tmp_path / "whole" / place)
     assert found.summary["movements"] == 200
-    with Record(tmp_path / "whole" / place / FILE) as record:
+    with Record(tmp_path / "whole" / place / RUN_FILE) as record:
         places = [event.place for event in record.events()]
     sizes = [here + 1 for here, after in pairwise([*places, 0]) if after == 0]
     assert sizes[:60] == [1] * 60

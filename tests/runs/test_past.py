@@ -10,7 +10,7 @@ from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.options.command_line import main
 from sgimd_torch.record.saving import save_life
-from sgimd_torch.runs.directory import FILE
+from sgimd_torch.runs.directory import RUN_FILE
 from sgimd_torch.runs.load import load_learner
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.signals import command
@@ -27,7 +27,7 @@ def past(tmp_path_factory):
     """The record of a run on the arm of seven joints."""
     out = tmp_path_factory.mktemp("past")
     assert go(out, "--movements", 120) == 0
-    return out / "practice/seed-000" / FILE
+    return out / "practice/seed-000" / RUN_FILE
 
 
 def table(path, past, names=("context", "theta", "outcome")):
@@ -86,13 +86,13 @@ def test_a_table_that_does_not_fit_is_refused(change, said, past, tmp_path, caps
 
 @pytest.mark.parametrize(("unit", "farther", "said"), [("mm", 0, "are in mm, here in m"), ("m", 1, "policies of")])
 def test_a_record_of_other_spaces_is_refused(unit, farther, said, past, tmp_path, capsys):
-    (tmp_path / FILE).write_bytes(past.read_bytes())
+    (tmp_path / RUN_FILE).write_bytes(past.read_bytes())
     spaces = read_run(past.parent).spaces
     told = {name: [box.low.tolist(), box.high.tolist(), box.names, box.unit] for name, box in spaces.items()}
     told["outcomes"][3] = unit
     told["policies"][1][2] += farther
     write_about(tmp_path, spaces=told)
-    refused(tmp_path / FILE, said, tmp_path / "out", capsys)
+    refused(tmp_path / RUN_FILE, said, tmp_path / "out", capsys)
 
 
 def test_a_file_that_is_no_past_of_this_robot_is_refused(past, tmp_path, capsys):
@@ -102,18 +102,10 @@ def test_a_file_that_is_no_past_of_this_robot_is_refused(past, tmp_path, capsys)
     edit(tmp_path / "damaged", "UPDATE events SET outcome_0 = 0.5 WHERE rowid = 9")
     os.mkfifo(tmp_path / "pipe")
     for name, said in (
-        (f"toss/practice/seed-000/{FILE}", "of context, theta, outcome, this robot has"),
+        (f"toss/practice/seed-000/{RUN_FILE}", "of context, theta, outcome, this robot has"),
         ("life.sqlite", "holds no movements to begin with"),
         ("damaged", "row 9 of events is not what was written"),
         ("pipe", "is a pipe or a device, not a file"),
         ("missing.csv", "cannot be read"),
     ):
         refused(tmp_path / name, said, tmp_path / "out", capsys)
-
-
-@pytest.mark.parametrize("options", [("--inverse", "nearest"), ("--evaluated-by", "own,model")])
-def test_a_learner_that_cannot_begin_again_begins_with_nothing(options, past, tmp_path, capsys):
-    assert go(tmp_path / "out", *options, "--begin-with", past) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert "prior (--begin-with) needs an inverse model that says how sure it is" in line
-    assert not (tmp_path / "out").exists()

@@ -160,23 +160,6 @@ def test_seeds_of_one_name_with_other_settings_are_named(copied, tiny, capsys):
     assert "random: its seeds differ in environment.task_space; were two studies given" in capsys.readouterr().err
 
 
-def last_column(said):
-    """Of each variant, and the head of the column."""
-    head, *lines = said.splitlines()
-    place = head.index("  minus ") + 2
-    return head[place:], {line.split()[0]: line[place:] for line in lines}
-
-
-def test_few_seeds_are_compared_with_the_baseline_by_their_differences_alone(runs, capsys):
-    assert table(runs, "--at", 40, "--baseline", "random") == 0
-    head, found = last_column(capsys.readouterr().out)
-    ours, theirs = (
-        read_run(runs / name / "seed-000").evaluations["own"]["mean_error"][-1] for name in ("sgim-d", "random")
-    )
-    assert head == "minus random (m)"
-    assert found == {"random": "-", "sgim-d": f"{ours - theirs:+.4f}"}  # of the only seed that both have
-
-
 def test_columns_are_as_wide_as_their_widest_cell_and_lines_end_with_text(capsys):
     print_table([("task", "error (m)", "seeds"), ("planar-arm-50", "0.1", "3"), ("toss", "0.25", "")])
     assert capsys.readouterr().out.splitlines() == [
