@@ -31,7 +31,7 @@ examples:
   sgimd check mypackage.toss:make                    find the mistakes in a robot of your own
   sgimd run --environment mypackage.toss:make        one run on this robot
   sgimd benchmark pool --out goals.npz               make goals for evaluation in places that runs in pool reached
-  sgimd demonstrations check shown.npz --task fishing-rod
+  sgimd demonstrations check shown.npz --environment fishing-rod
   sgimd sweep --vary goals=interest-map,uniform --seeds 0-9 --out study
   sgimd table study                                  print the mean error of each variant over its seeds
   sgimd report study                                 write curves, maps and tables to one page

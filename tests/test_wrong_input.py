@@ -10,7 +10,6 @@ import pytest
 import sgimd_torch as s
 from sgimd_torch.__main__ import _call
 from sgimd_torch.algorithms.paper import sgim_d
-from sgimd_torch.environments.protocol import execute_many
 from sgimd_torch.runs.signals import command
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.spaces import Box, Demonstration, stream
@@ -79,15 +78,6 @@ def learner(**parts):
     return s.sagg_riac(ARM, 0, **parts)
 
 
-class Silent(s.PlanarArm):
-    """Its outcome has no return."""
-
-    execute_many = None
-
-    def execute(self, context, theta, rng):
-        super().execute(context, theta, rng)
-
-
 CALLS = {
     "no inverse": (lambda: learner(inverse=None), "Inverse must be a class or a function, got a NoneType"),
     "a generator for a seed": (lambda: s.sagg_riac(ARM, stream(0, "a")), "seed must be a whole number >= 0"),
@@ -113,10 +103,6 @@ CALLS = {
     "a text for names": (lambda: Box(np.zeros(2), np.ones(2), names="xy"), "Box needs 2 names"),
     "an escape code in a name": (lambda: Box.cube(0, 1, 1, names=("x\x1b[31m",)), "without control characters"),
     "a seed for a teacher": (lambda: PeriodicTeacher([SHOWN], 0), "rng must be a numpy.random.Generator, got int"),
-    "no return": (
-        lambda: execute_many(Silent(5), np.zeros((3, 0)), np.full((3, 5), 0.5), [stream(0, "a", k) for k in range(3)]),
-        r"execute\(\) of movement 0 must give numbers of shape \(2,\), got NoneType; is there a return\?",
-    ),
 }
 
 

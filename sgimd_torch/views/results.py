@@ -1,4 +1,4 @@
-"""The table of results, one row for each variant, and tables on stdout as text, as csv, or for LaTeX.
+"""The table of results, one row for each variant, and tables on stdout, as text or as csv.
 
     for column in results(variants): column.head, column.texts()    # of sgimd table and of sgimd report
     print_table([("variant", "error (m)"), ("sgim-d", "0.123"), ("random", "0.456")])    # the first row is the head
@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import csv
 import io
-import re
 from collections.abc import Iterable, Sequence
 from typing import Final, NamedTuple
 
@@ -23,12 +22,6 @@ from sgimd_torch.views.statistics import Interval, interval_text, over_seeds
 from sgimd_torch.views.variants import EARLY, Variant, unit_of
 
 MISSING: Final = "-"  # text of a number that is not known
-LATEX: Final = {  # signs that have a meaning in LaTeX
-    **{sign: f"\\{sign}" for sign in "&%$#_{}"},
-    "\\": r"\textbackslash{}",
-    "~": r"\textasciitilde{}",
-    "^": r"\textasciicircum{}",
-}
 
 
 class Column(NamedTuple):
@@ -99,16 +92,3 @@ def print_csv(rows: Iterable[Sequence[str]]) -> None:
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows([printable(cell) for cell in row] for row in rows)
     print(text.getvalue(), end="", flush=True)
-
-
-def print_latex(rows: Sequence[Sequence[str]]) -> None:
-    """Print rows as a ``tabular`` of LaTeX, which needs no package; numbers are aligned to the right."""
-    head, *lines = [" & ".join(map(_in_latex, row)) + r" \\" for row in rows]
-    print(rf"\begin{{tabular}}{{l{'r' * (len(rows[0]) - 1)}}}", r"\hline", head, r"\hline", *lines, sep="\n")
-    print(r"\hline", r"\end{tabular}", sep="\n", flush=True)
-
-
-def _in_latex(cell: str) -> str:
-    """The text of a cell in LaTeX; a minus before a digit is set as one."""
-    text = "".join(LATEX.get(sign, sign) for sign in printable(cell).replace("\n", " "))
-    return re.sub(r"(?<![\w.])-(?=\d)", "$-$", text)

@@ -180,7 +180,7 @@ def test_a_reader_that_thinks_for_long_keeps_no_lock_and_sees_one_state(tmp_path
         before = list(reader.rows("events"))
         writer.add(moved([0.1, 0.2, 0.3]))
         writer.replace_rows("goals", [(0, 0.5, 0.5)])
-        assert writer.commit(wait=False)
+        assert writer.commit()
         assert list(reader.rows("events")) == before
 
 

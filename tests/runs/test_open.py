@@ -15,6 +15,7 @@ import pytest
 
 from boards import curves_of
 from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.environments.sketch import traced
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.options.build import build
 from sgimd_torch.options.command_line import main, parse
@@ -104,7 +105,7 @@ def miss_of(parts, thetas):
     """How far the film's movement at the first of ``GOALS`` lands from it, as the film says it."""
     contexts, robot = parts.environment.contexts, parts.environment
     middle = (contexts.low + contexts.high) / 2
-    landed = parts.task.picture(middle, thetas[0], stream(parts.config.seed, "film", 0)).outcome
+    landed = traced(robot, middle, thetas[0], stream(parts.config.seed, "film", 0)).outcome
     return robot.outcomes.amount(float(np.linalg.norm(landed - GOALS[0])))
 
 

@@ -240,7 +240,7 @@ def test_a_full_disk_is_reported_and_the_run_can_go_on(tmp_path, go, benchmark, 
 
 def test_a_program_that_reads_the_record_all_the_time_stops_no_run(tmp_path, go, reference, monkeypatch, capsys):
     monkeypatch.setattr(run_module, "COMMIT_EVERY", 0.0)
-    monkeypatch.setattr("sgimd_torch.record._IMPATIENCE", 0.0)
+    monkeypatch.setattr("sgimd_torch.record._PATIENCE", 0.0)
     path, after, commit = (
         tmp_path / "sgim-d" / "seed-003" / RUN_FILE,
         run_module.RunLoop._after,

@@ -20,7 +20,6 @@ from sgimd_torch.runs.signals import command
 from sgimd_torch.spaces import Box, stream
 from sgimd_torch.views import check
 from sgimd_torch.views.film import command as film
-from sgimd_torch.views.film.camera import Camera
 from sgimd_torch.views.film.model_camera import viewing
 from sgimd_torch.views.film.reel import PAUSE, RATES, Shot, write_film
 from sgimd_torch.views.film.sketch import Sketchbook, panel
@@ -122,8 +121,7 @@ def test_the_caption_says_when_the_line_is_let_out_and_how_far_the_goal_was_miss
     shot = Shot(recording, recording.outcome + np.array([0.03, 0.04]))
     assert shot.missed == pytest.approx(0.05)
     before, after = recording.let_out, (recording.let_out + recording.landed) / 2
-    assert [Camera.note(shot, time) for time in (before, after)] == ["", "line let out"]
-    assert [shot.caption(after, note).endswith(" s   line let out") for note in ("", "line let out")] == [False, True]
+    assert [shot.caption(time).endswith(" s   line let out") for time in (before, after)] == [False, True]
     assert shot.caption(recording.landed).endswith("missed by 0.05")
 
 
