@@ -173,6 +173,12 @@ def test_a_run_without_movements_is_refused(run_path, tmp_path, capsys):
     assert "has no movements yet" in capsys.readouterr().err
 
 
+def test_without_ffmpeg_nothing_is_replayed(run_path, tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", str(tmp_path / "none"))
+    assert command(film.main, [str(run_path), "--out", str(tmp_path / "film.mp4")]) == 2
+    assert "films need the program ffmpeg" in capsys.readouterr().err
+
+
 def filmed(run_path, gl, *options):
     """In another process, since MuJoCo chooses how to draw when it is imported."""
     return subprocess.run(
