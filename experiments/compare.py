@@ -27,7 +27,7 @@ with loading():  # Ctrl-C shows no traceback
     import changing
     import random_robots
     from sgimd_torch.files import make_folder
-    from sgimd_torch.options.catalogue import unknown
+    from sgimd_torch.options.catalogue import unknown_name_error
     from sgimd_torch.options.config import OWN, Config
     from sgimd_torch.record import RunError
     from sgimd_torch.runs.parallel import sweep
@@ -223,7 +223,7 @@ def _check_known(what: str, name: str, known: Collection[str]) -> None:
         raise ValueError(f"{name} is a variant of {' and '.join(homes)}; write {homes[0]} --only {name}")
     if name in EXPERIMENTS:
         raise ValueError(f"{name} is an experiment, not a variant; experiments go before --only")
-    raise unknown(what, name, known)
+    raise unknown_name_error(what, name, known)
 
 
 if __name__ == "__main__":

@@ -38,7 +38,7 @@ interest by the oldest goals of a region | goals/regions.py | goals/test_regions
     competences[-window:] ==> competences[:window]
 eq. (4): the least interest is not subtracted | goals/regions.py | goals/test_interest.py
     interests - interests.min() ==> interests
-modes 1 and 2 have each other's probability | goals/regions.py | goals/test_interest.py
+modes 1 and 2 have each other's probability | goals/interest_map.py | goals/test_interest.py
     (0.7, 0.2, 0.1) ==> (0.2, 0.7, 0.1)
 split one goal too early | goals/interest_map.py | goals/test_interest.py
     <= self.g_max: ==> < self.g_max:
@@ -85,15 +85,15 @@ board: goals met within a whole tile | board/listener.py | board/test_board.py
 index: contexts do not count | memory/__init__.py | memory/test_memory.py
     np.concatenate((contexts, outcomes), axis=1) ==> np.concatenate((0 * contexts, outcomes), axis=1)
 index: of equally near exemplars the newest first | memory/scan.py | memory/test_memory.py
-    squared[place - 1] > distance ==> squared[place - 1] >= distance
+    squared[position - 1] > distance ==> squared[position - 1] >= distance
 index: the radius is squared once | memory/neighbours.py | memory/test_memory.py
     np.where(squared <= within * within, rows, -1) ==> np.where(squared <= within, rows, -1)
 index: a larger k gets the rows of the last query | memory/neighbours.py | memory/test_neighbours.py
-    asked != key or rows.shape[1] < min(n, max(k, LISTED)) or ==> asked != key or
+    last_query != key or rows.shape[1] < min(n, max(k, LISTED)) or ==> last_query != key or
 a Gaussian process with another kernel | inverses/kernels.py | inverses/test_local_process.py
     5 / 3 * distance**2) * decay ==> 5 / 2 * distance**2) * decay
 requests: a teacher without a reply costs nothing | asking/strategy.py | asking/test_asking.py
-    self.goals.add(context, goal, -1.0, strategy, -1.0) ==> self.goals.add(context, goal, -1.0, strategy, 0.0)
+    strategy=strategy, gain=-1.0) ==> strategy=strategy, gain=0.0)
 requests: costs do not count | asking/interest.py | asking/test_interest.py
     - np.log(cost) ==> - 0 * np.log(cost)
 record: the outcome in the columns of the goal | record/layout.py | record/test_record.py

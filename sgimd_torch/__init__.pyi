@@ -2,7 +2,9 @@ from .algorithms.paper import imitation as imitation
 from .algorithms.paper import observation as observation
 from .algorithms.paper import random_exploration as random_exploration
 from .algorithms.paper import sagg_riac as sagg_riac
+from .algorithms.paper import sagg_riac_letter as sagg_riac_letter
 from .algorithms.paper import sgim_d as sgim_d
+from .algorithms.paper import sgim_d_letter as sgim_d_letter
 from .algorithms.practice import practice as practice
 from .algorithms.practice import practice_taught as practice_taught
 from .competence import performance as performance

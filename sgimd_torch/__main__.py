@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from sgimd_torch import __version__
-from sgimd_torch.options.catalogue import WORDS, about, unknown
+from sgimd_torch.options.catalogue import WORDS, about, unknown_name_error
 from sgimd_torch.runs.signals import ONE_THREAD, command, loading
 
 EXTRAS: Final = {
@@ -31,7 +31,7 @@ examples:
   sgimd check mypackage.toss:make                    find the mistakes in a robot of your own
   sgimd run --environment mypackage.toss:make        one run on this robot
   sgimd benchmark pool --out goals.npz               make goals for evaluation in places that runs in pool reached
-  sgimd demonstrations check shown.npz --task fishing-rod
+  sgimd demonstrations check shown.npz --environment fishing-rod
   sgimd sweep --vary goals=interest-map,uniform --seeds 0-9 --out study
   sgimd table study                                  print the mean error of each variant over its seeds
   sgimd report study                                 write curves, maps and tables to one page
@@ -55,7 +55,7 @@ def _call(words: Sequence[str]) -> int:
         print(f"sgimd_torch {__version__}")
         return 0
     if name not in WORDS["command"]:
-        raise unknown("command", name, WORDS["command"], "; sgimd --help explains the commands")
+        raise unknown_name_error("command", name, WORDS["command"], "; sgimd --help explains the commands")
     try:
         with loading():
             module = importlib.import_module(f"sgimd_torch.{WORDS['command'][name]}")

@@ -7,6 +7,7 @@ its movements, and it has random streams of its own.
 
 from __future__ import annotations
 
+import math
 import os
 from bisect import bisect_left
 from collections.abc import Callable, Sequence
@@ -20,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from sgimd_torch.environments.protocol import BatchEnvironment, Environment, execute_many, observed
 from sgimd_torch.files import read_npz, write_npz
 from sgimd_torch.parts import Inverse
-from sgimd_torch.spaces import Array, Box, Estimate, check_count, check_vector, first_entry, stream
+from sgimd_torch.spaces import Array, Box, Estimate, Failure, check_count, check_vector, first_entry, stream
 
 SHIPPED = Path(__file__).with_name("data") / "benchmark.npz"
 TILES: Final = 358  # number of goals in the paper's benchmark
@@ -138,9 +139,9 @@ class OwnGoals:
             self.begun.append(index)
             self.missed.append(np.inf)
         self._seen[goal.tobytes()] = place, index
-        self.missed[place] = min(self.missed[place], float(np.linalg.norm(outcome - goal)))
+        self.missed[place] = min(self.missed[place], math.dist(outcome, goal))
 
-    def recent(self, movements: int) -> Array:
+    def recent_misses(self, movements: int) -> Array:
         """``(n,)``, distances missed at the last 50 goals begun in this number of ``movements``, or fewer."""
         until = bisect_left(self.begun, movements)
         return np.array(self.missed[max(0, until - RECENT) : until])
@@ -220,17 +221,20 @@ def _landed(
     environment: Environment, contexts: Array, thetas: Array, seed: int, name: str, between: Callable[[], object]
 ) -> Array:
     """Outcomes ``(n, outcome_dim)``, NaN for a failed movement; movement i has stream i of this ``name``."""
-    landed, n = np.full((len(thetas), environment.outcomes.dim), np.nan), len(thetas)
+    landed = np.full((len(thetas), environment.outcomes.dim), np.nan)
     together = TOGETHER if isinstance(environment, BatchEnvironment) else 1
-    waiting = [list(range(start, min(start + together, n))) for start in range(0, n, together)][::-1]
+    allowed = np.flatnonzero(environment.policies.contains(thetas)).tolist()  # no other theta may go to a robot
+    waiting = [allowed[start : start + together] for start in range(0, len(allowed), together)][::-1]
     while waiting:
         between()
         rows = waiting.pop()
-        try:
-            rngs = [stream(seed, name, row) for row in rows]
-            landed[rows] = execute_many(environment, contexts[rows], thetas[rows], rngs)
-        except (Exception, SystemExit):  # no failure of a robot may end an evaluation
-            waiting += [[row] for row in rows if len(rows) > 1]  # one of them failed: they move again, one by one
+        rngs = [stream(seed, name, row) for row in rows]
+        outcomes = execute_many(environment, contexts[rows], thetas[rows], rngs)
+        if len(rows) > 1 and all(isinstance(outcome, Failure) for outcome in outcomes):
+            waiting += [[row] for row in rows]  # perhaps one of them failed: they move again, one by one
+            continue
+        for row, outcome in zip(rows, outcomes, strict=True):
+            landed[row] = np.nan if isinstance(outcome, Failure) else outcome
     return landed
 
 

@@ -13,23 +13,21 @@ All robots wait for the slowest. A robot that fails ends its own attempt only.
 
 from __future__ import annotations
 
-import traceback
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from itertools import chain
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from sgimd_torch.environments.protocol import (
     FAILURES,
-    BatchEnvironment,
     Environment,
-    SimulationError,
     check_instance,
+    execute_many,
     observed,
+    tried,
 )
 from sgimd_torch.learner import Learner
 from sgimd_torch.learner.events import BeforeMovement
@@ -42,8 +40,6 @@ from sgimd_torch.spaces import (
     Move,
     Request,
     check_count,
-    check_point,
-    read_only,
     stream,
 )
 
@@ -181,7 +177,7 @@ def _observed(learner: Learner, environment: Environment, index: int, place: int
     context = learner.context_at(place)
     if context is not None:
         return context
-    return _tried("context", environment.contexts.dim, observed, environment, stream(seed, "context", index))
+    return tried("context", environment.contexts.dim, observed, environment, stream(seed, "context", index))
 
 
 def _asked(
@@ -216,21 +212,6 @@ def _executed(
     return outcomes
 
 
-def _tried(name: str, dim: int, robot: Callable[..., ArrayLike], *given: Any) -> Array | Failure:
-    """Result of a call of the robot, as ``(dim,)`` finite numbers, or why there is none."""
-    try:
-        return read_only(check_point(name, robot(*given), dim))
-    except (Exception, SystemExit) as error:  # no failure of a robot may end the run
-        return Failure(reason_of(error), error)
-
-
-def reason_of(error: BaseException) -> str:
-    """Reason why a robot failed, in one line of at most 300 printable characters."""
-    simulated = isinstance(error, SimulationError)
-    said = str(error) if simulated else "".join(traceback.format_exception_only(error))
-    return "".join(sign if sign.isprintable() else " " for sign in said)[:300].strip()
-
-
 def _reply(
     learner: Learner, environment: Environment, context: Array, request: Request, teachers: Mapping[str, Demonstrator]
 ) -> tuple[Demonstration | None, str]:
@@ -261,25 +242,6 @@ def live(environment: Environment, seed: int) -> Execute:
     """The function that executes movements in ``environment``; movement i draws its noise from stream i."""
 
     def execute(indices: Sequence[int], contexts: Sequence[Array], thetas: Sequence[Array]) -> list[Array | Failure]:
-        rngs, dim = [stream(seed, "environment", index) for index in indices], environment.outcomes.dim
-        if len(indices) > 1 and isinstance(environment, BatchEnvironment):
-            return _tried_together(environment, np.stack(contexts), np.stack(thetas), rngs)
-        # The environment gets copies, so it may write into them.
-        moves = zip(contexts, thetas, rngs, strict=True)
-        return [_tried("outcome", dim, environment.execute, c.copy(), theta.copy(), rng) for c, theta, rng in moves]
+        return execute_many(environment, contexts, thetas, [stream(seed, "environment", index) for index in indices])
 
     return execute
-
-
-def _tried_together(
-    environment: BatchEnvironment, contexts: Array, thetas: Array, rngs: Sequence[np.random.Generator]
-) -> list[Array | Failure]:
-    """Outcomes of `BatchEnvironment.execute_many`; if it raises, all movements have failed."""
-    n, dim = len(thetas), environment.outcomes.dim
-    try:
-        outcomes = np.asarray(environment.execute_many(contexts, thetas, rngs))
-        if outcomes.shape != (n, dim):
-            raise ValueError(f"execute_many() must give {n} outcomes in rows, ({n}, {dim}), got {outcomes.shape}")
-    except (Exception, SystemExit) as error:  # no failure of a robot may end the run
-        return [Failure(reason_of(error), error)] * n
-    return [_tried("outcome", dim, np.copy, outcome) for outcome in outcomes]

@@ -111,7 +111,7 @@ class GoalBabbling(Strategy):
     def pursue(self, context: Array, goal: Array, strategy: str = "autonomous") -> Attempt:
         """Pursue ``goal`` until it is reached or given up, the budget is spent, or a demonstration interrupts."""
         outcomes: list[Array] = []
-        before = best = self.competence(context, goal)
+        competence_before = best = self.competence(context, goal)
         moves = self._explore(context, goal)
         move = next(moves)
         try:
@@ -120,27 +120,29 @@ class GoalBabbling(Strategy):
                 outcomes.append(outcome)
                 if len(outcomes) == self.budget or np.linalg.norm(outcome - goal) <= self.tolerance:
                     return
-                last, best = best, self.competence(context, goal)
-                if best <= last and best < self.give_up:
+                previous, best = best, self.competence(context, goal)
+                if best <= previous and best < self.give_up:
                     return
                 move = moves.send(outcome)
         finally:  # interruption by a demonstration included
-            self.conclude(context, goal, outcomes, before, strategy)
+            self.report_competence(context, goal, outcomes, competence_before, strategy)
 
-    def conclude(self, context: Array, goal: Array, outcomes: list[Array], before: float, strategy: str) -> None:
-        """Tell the goal model the result of an attempt, unless the attempt had no movement.
+    def report_competence(
+        self, context: Array, goal: Array, outcomes: list[Array], competence_before: float, strategy: str
+    ) -> None:
+        """Tell the goal model the competence now, and its rise during an attempt, unless the attempt had no movement.
 
         Args:
             outcomes: outcomes ``(outcome_dim,)`` of the attempt.
-            before: competence at the goal when the attempt began.
+            competence_before: competence at the goal when the attempt began.
             strategy: name of the strategy that chose the goal: "autonomous", "social" or another name.
         """
         if outcomes:
             judged, after = self.judge(context, goal, np.stack(outcomes)), self.competence(context, goal)
             # The new nearest exemplar in (context, outcome) may be farther in outcome alone; this is no loss.
-            gain = max(0.0, after - before)
+            gain = max(0.0, after - competence_before)
             if gain == 0 and judged != after:  # the judge rates the attempt alone, which may be worse than the memory
-                gain = min(0.0, judged - before)
+                gain = min(0.0, judged - competence_before)
             self.goals.add(context, goal, judged, strategy, gain)
 
     def _explore(self, context: Array, goal: Array) -> Attempt:
@@ -176,12 +178,14 @@ class GoalBabbling(Strategy):
 
 
 class Mimic(Social):
-    """Imitate a policy, section 4.2: execute theta_d exactly, then with small variations.
+    """Imitate a policy, section 4.2: execute theta_d, exactly at first, then with small variations.
 
     Args:
         problem: problem to learn.
         repeats: number of movements for one demonstration; None: keep imitating until the next demonstration.
         epsilon: largest variation of each parameter, in the unit of the parameter.
+        exact_first: true: the first movement is theta_d itself, so its outcome is known; false: all are varied.
+            Deviation: the paper varies all.
         draws_from: name of the random stream of the variations.
 
     Raises:
@@ -194,13 +198,14 @@ class Mimic(Social):
         *,
         repeats: int | None = 10,
         epsilon: float = 0.05,
+        exact_first: bool = True,
         draws_from: str = "imitate",
     ) -> None:
         super().__init__(problem)
         if not 0 <= epsilon < np.inf:
             raise ValueError(f"epsilon must be a bound of variations, finite and >= 0, got {epsilon}")
         self.repeats = repeats if repeats is None else check_count("repeats", repeats, 1)
-        self.epsilon, self.draws_from = epsilon, draws_from
+        self.epsilon, self.exact_first, self.draws_from = epsilon, exact_first, draws_from
 
     def attempt(self, context: Array, theta_d: Array, demonstration: Demonstration) -> Attempt:
         """theta_d, then its variations."""
@@ -209,8 +214,7 @@ class Mimic(Social):
     def repeat(self, theta_d: Array, goal: Array, outcomes: list[Array]) -> Attempt:
         """The movements of an imitation; their outcomes are appended to ``outcomes``."""
         for repeat in range(self.repeats) if self.repeats is not None else itertools.count():
-            # Deviation: the paper varies all repeats. Here the first is exact and shows the outcome of theta_d itself.
-            theta = theta_d if repeat == 0 else self._vary(theta_d)
+            theta = theta_d if repeat == 0 and self.exact_first else self._vary(theta_d)
             outcomes.append((yield Move(theta, goal, "imitate")))
 
     def _vary(self, theta_d: Array) -> Array:
@@ -226,10 +230,14 @@ class Imitate(Mimic):
         problem: problem to learn, with the goal babbling of the learner.
         repeats: number of movements for one demonstration; None: keep imitating until the next demonstration.
         epsilon: largest variation of each parameter, in the unit of the parameter.
+        exact_first: true: the first movement is theta_d itself, so its outcome is known; false: all are varied.
+            Deviation: the paper varies all.
     """
 
-    def __init__(self, problem: Problem, *, repeats: int | None = 10, epsilon: float = 0.05) -> None:
-        super().__init__(problem, repeats=repeats, epsilon=epsilon)
+    def __init__(
+        self, problem: Problem, *, repeats: int | None = 10, epsilon: float = 0.05, exact_first: bool = True
+    ) -> None:
+        super().__init__(problem, repeats=repeats, epsilon=epsilon, exact_first=exact_first)
         self.babbling = _babbling(problem)
 
     def attempt(self, context: Array, theta_d: Array, demonstration: Demonstration) -> Attempt:
@@ -239,11 +247,11 @@ class Imitate(Mimic):
             yield from super().attempt(context, theta_d, demonstration)
             return
         outcomes: list[Array] = []
-        before = self.babbling.competence(context, goal)
+        competence_before = self.babbling.competence(context, goal)
         try:
             yield from self.repeat(theta_d, goal, outcomes)
         finally:  # interruption by the next demonstration included
-            self.babbling.conclude(context, goal, outcomes, before, "social")
+            self.babbling.report_competence(context, goal, outcomes, competence_before, "social")
 
 
 class Emulate(Social):

@@ -92,10 +92,8 @@ PARTS = {
 @pytest.mark.filterwarnings("ignore:teacher hostile")
 @pytest.mark.parametrize("habit", HABITS)
 @pytest.mark.parametrize("member", PARTS)
-def test_whatever_a_part_does_a_run_goes_on_or_ends_in_one_clear_message(tmp_path, monkeypatch, capsys, member, habit):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.syspath_prepend(tmp_path)
-    (tmp_path / "hostile.py").write_text(MODULE)
+def test_whatever_a_part_does_a_run_goes_on_or_ends_in_one_clear_message(module, capsys, member, habit):
+    module("hostile", MODULE)
     words = f"{PARTS[member].format(f'{member}_{habit}')} --movements 40 --repeats 0 --name one".split()
     code = command(command_line.main, words)
     said = capsys.readouterr().err

@@ -10,8 +10,6 @@ import pytest
 import sgimd_torch as s
 from sgimd_torch.__main__ import _call
 from sgimd_torch.algorithms.paper import sgim_d
-from sgimd_torch.environments.protocol import execute_many
-from sgimd_torch.evaluation import evaluate
 from sgimd_torch.runs.signals import command
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.spaces import Box, Demonstration, stream
@@ -80,18 +78,8 @@ def learner(**parts):
     return s.sagg_riac(ARM, 0, **parts)
 
 
-class Silent(s.PlanarArm):
-    """Its outcome has no return."""
-
-    execute_many = None
-
-    def execute(self, context, theta, rng):
-        super().execute(context, theta, rng)
-
-
 CALLS = {
     "no inverse": (lambda: learner(inverse=None), "Inverse must be a class or a function, got a NoneType"),
-    "a budget of nothing": (lambda: learner(budget=0), "budget must be a whole number >= 1, got 0"),
     "a generator for a seed": (lambda: s.sagg_riac(ARM, stream(0, "a")), "seed must be a whole number >= 0"),
     "a class for an environment": (lambda: s.sagg_riac(s.PlanarArm, 0), r"got the class PlanarArm .* PlanarArm\(\)"),
     "a class in a task": (lambda: Task(s.PlanarArm), "got the class PlanarArm itself"),
@@ -109,19 +97,12 @@ CALLS = {
         lambda: next(s.run(learner(), ARM, 0, movements=3, failures=1.5)),
         "failures must be a whole number >= 1, got 1.5",
     ),
-    "a tolerance that is none": (lambda: learner(tolerance=np.nan), "tolerance must .* got nan"),
-    "movements that are none": (lambda: next(s.run(learner(), ARM, 0, movements=1e3)), "movements must be a whole"),
     "a pupil that cannot learn": (lambda: learner().watch(SHOWN), "has no social strategy"),
     "no correspondence": (lambda: sgim_d(ARM, 0), "missing 1 required keyword-only argument: 'correspondence'"),
-    "one goal": (lambda: evaluate(learner().inverse, ARM, np.zeros(2), 0, 0), "goals must have shape"),
     "corners swapped": (lambda: Box(np.ones(2), np.zeros(2)), "corners with low < high, .* were they swapped?"),
     "a text for names": (lambda: Box(np.zeros(2), np.ones(2), names="xy"), "Box needs 2 names"),
     "an escape code in a name": (lambda: Box.cube(0, 1, 1, names=("x\x1b[31m",)), "without control characters"),
     "a seed for a teacher": (lambda: PeriodicTeacher([SHOWN], 0), "rng must be a numpy.random.Generator, got int"),
-    "no return": (
-        lambda: execute_many(Silent(5), np.zeros((3, 0)), np.full((3, 5), 0.5), [stream(0, "a", k) for k in range(3)]),
-        r"execute\(\) of movement 0 must give numbers of shape \(2,\), got NoneType; is there a return\?",
-    ),
 }
 
 

@@ -1,4 +1,4 @@
-"""The five learners of the paper, each built from an autonomous and a social strategy.
+"""The five learners of the paper, each built from an autonomous and a social strategy; two of them to the letter, too.
 
 Section 5.1 of Nguyen & Oudeyer (2014). Every part is a keyword, so an ablation changes one argument:
     learner = sgim_d(environment, seed, correspondence=environment.primitive.correspondence, goals=UniformGoals)
@@ -11,12 +11,15 @@ Every algorithm can start from a copy of a ``memory``: of another run, of anothe
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from functools import partial
+from typing import Any, Final
 
 from sgimd_torch.algorithms import MakeInverse
 from sgimd_torch.changes import noticing_changes
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.goals.interest_map import InterestMap
+from sgimd_torch.goals.regions import absolute_progress
+from sgimd_torch.inverses.local import LocalInverse
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Correspondence, Learner
 from sgimd_torch.memory import Memory
@@ -26,6 +29,16 @@ from sgimd_torch.searches.simplex import NelderMead
 from sgimd_torch.strategies import Babble, GoalBabbling, Imitate, Mimic, Remember, Rest
 
 # Deviation: the paper infers by eq. (9) alone, which is `LocalInverse`; the default `LocalProcess` has smaller errors.
+
+LETTER: Final[dict[str, Any]] = {
+    "goals": partial(InterestMap, g_max=50, max_aspect=1e9, progress=absolute_progress),  # eq. (3)
+    "search": partial(NelderMead, noise=0.0, complete=True, xatol=1e-4, fatol=1e-4),  # ends by the budget
+    "budget": 60,  # more movements than the 30 between two demonstrations, so no limit
+    "global_range": (0.0, 1.0),
+    "give_up": -1.0,
+}
+"""Parts and options of `GoalBabbling` to the letter of the paper. The paper gives no numbers for budget and g_max."""
+VARIED: Final = partial(Imitate, exact_first=False)
 
 
 def random_exploration(
@@ -83,7 +96,7 @@ def sagg_riac(
     prior: Memory | None = None,
     **parts: Any,
 ) -> Learner:
-    """SAGG-RIAC: goal babbling without a teacher.
+    """SAGG-RIAC: goal babbling without a teacher, with our inverse model and exploration.
 
     Args:
         environment: robot and world; nothing is executed here.
@@ -113,7 +126,9 @@ def sgim_d(
     prior: Memory | None = None,
     **parts: Any,
 ) -> Learner:
-    """SGIM-D: goal babbling; after each demonstration a short imitation.
+    """SGIM-D: the paper's algorithm with our inverse model and exploration; as printed: sgim-d-letter.
+
+    Goal babbling, and after each demonstration a short imitation.
 
     Args:
         environment: robot and world; nothing is executed here.
@@ -132,3 +147,21 @@ def sgim_d(
         return Learner(problem, problem.autonomous, social=Social.of(social, problem), correspondence=correspondence)
 
     return noticing_changes(begin, seed, memory, prior)
+
+
+@with_keywords_of(sagg_riac, inverse=LocalInverse, **LETTER)
+def sagg_riac_letter(environment: Environment, seed: int, **options: Any) -> Learner:
+    """SAGG-RIAC to the letter: eqs. (3) and (9), 26 vertices, no limits of probability or effort.
+
+    Options as for `sagg_riac`.
+    """
+    return sagg_riac(environment, seed, **options)
+
+
+@with_keywords_of(sgim_d, social=VARIED, inverse=LocalInverse, **LETTER)
+def sgim_d_letter(environment: Environment, seed: int, *, correspondence: Correspondence, **options: Any) -> Learner:
+    """SGIM-D to the letter: eqs. (3) and (9), 26 vertices, no limits; even the first imitation is varied.
+
+    Options as for `sgim_d`.
+    """
+    return sgim_d(environment, seed, correspondence=correspondence, **options)

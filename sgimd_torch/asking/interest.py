@@ -25,12 +25,12 @@ from sgimd_torch.spaces import Array
 
 AUTONOMOUS: Final = "autonomous"
 _FEWEST: Final = 4  # least number of attempts from which progress is computed
-_LAST: Final = 10  # greatest number of attempts from which progress is computed
+_MOST: Final = 10  # greatest number of attempts from which progress is computed
 # Probability that first a goal uniform in T is drawn, and then a strategy by its interest at this goal.
 _GOAL_FIRST: Final = 0.5
-_GREATEST: Final = 10  # number of pairs (region, strategy), those with the greatest interest, of which one is drawn
+_BEST_PAIRS: Final = 10  # number of pairs (region, strategy), those with the greatest interest, of which one is drawn
 _TEMPERATURE: Final = 0.03  # difference of progress for which interest is e times as large
-_UNTRIED: Final = 1.0  # progress of an untried strategy, the greatest possible
+_UNTRIED: Final = 1.0  # progress of a strategy with too few attempts, the greatest possible
 
 
 def progresses(competences: Array, gains: Array) -> Array:
@@ -55,7 +55,7 @@ def between_means(region: Region, below: NDArray[np.bool_]) -> float:
     return float((values[below].mean() - values[~below].mean()) ** 2)
 
 
-BY_STRATEGY: Final = partial(InterestMap, g_max=50, window=_LAST, progress=strategic_progress, contrast=between_means)
+BY_STRATEGY: Final = partial(InterestMap, g_max=50, window=_MOST, progress=strategic_progress, contrast=between_means)
 
 
 class StrategicGoals(Goals):
@@ -129,7 +129,7 @@ class StrategicInterest(StrategicGoals):
         excess = progress - cheapest
         worth = cheapest + np.minimum(excess, excess / cost)
         logarithms = (worth / _TEMPERATURE - np.log(cost)).ravel()
-        best = np.argsort(-logarithms, kind="stable")[:_GREATEST]
+        best = np.argsort(-logarithms, kind="stable")[:_BEST_PAIRS]
         interests = np.exp(logarithms[best] - logarithms[best[0]])
         region, name = pairs[int(self.rng.choice(best, p=interests / interests.sum()))]
         dim = len(context)
@@ -165,5 +165,5 @@ class _Attempts(NamedTuple):
 
     def progress_near(self, point: Array, sides: Array) -> float:
         """Progress over the ten attempts nearest to a point of C x T; distances are relative to ``sides``."""
-        nearest = np.argsort(np.square((self.points - point) / sides).sum(axis=1), kind="stable")[:_LAST]
+        nearest = np.argsort(np.square((self.points - point) / sides).sum(axis=1), kind="stable")[:_MOST]
         return strategic_progress(self.points[nearest], self.competences[nearest], self.gains[nearest])

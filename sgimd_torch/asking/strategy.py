@@ -22,8 +22,8 @@ from sgimd_torch.strategies import GoalBabbling, recording_outcomes
 
 
 class Asking(NamedTuple):
-    """Strategy that asks: name of the teacher, social strategy that uses the demonstration, cost of a demonstration,
-    and number of movements for which the learner rests until the reply comes."""
+    """Strategy that asks: name of the teacher, social strategy that uses the demonstration, cost of an attempt relative
+    to an autonomous one, and duration of a reply: number of movements for which the learner then rests."""
 
     teacher: str
     social: Social
@@ -36,7 +36,7 @@ class StrategicBabbling(ThroughBabbling):
 
     Args:
         babbling: autonomous strategy; its goal model chooses among all strategies.
-        asking: mapping from names to strategies that ask a teacher.
+        asking: mapping from names, other than "autonomous", to strategies that ask a teacher.
 
     Raises:
         ValueError: a cost is not positive, or the goal model is no `StrategicGoals`.
@@ -48,7 +48,7 @@ class StrategicBabbling(ThroughBabbling):
             raise ValueError(
                 f"goals must be StrategicGoals, which choose strategies, too, got a {type(babbling.goals).__name__}"
             )
-        self.costs = {AUTONOMOUS: 1.0, **{name: request.cost for name, request in asking.items()}}
+        self.costs = {AUTONOMOUS: 1.0, **{name: option.cost for name, option in asking.items()}}
         if not all(0 < cost < np.inf for cost in self.costs.values()):
             raise ValueError(f"costs must be positive and finite, got {self.costs}")
         self.asking, self.goals = asking, babbling.goals
@@ -57,7 +57,7 @@ class StrategicBabbling(ThroughBabbling):
         """Movements by one strategy for one goal; if the teacher has no reply, the movements are autonomous.
 
         Deviation: competence is measured only at the goal and at the demonstrated outcome. The papers measure it at
-        every outcome of the attempt, by which a mislabelling teacher would look good.
+        every outcome of the attempt. By this, a teacher whose demonstrations miss the requested goal would look good.
         """
         strategy, goal = self.goals.choose(context, self.costs)
         if strategy == AUTONOMOUS:
@@ -65,20 +65,20 @@ class StrategicBabbling(ThroughBabbling):
             return
         teacher, social, _, takes = self.asking[strategy]
         lesson = yield Request(teacher, goal, strategy)
-        before = self.babbling.competence(context, goal)
-        if lesson is None:  # a request without a reply counts as no progress
-            self.goals.add(context, goal, -1.0, strategy, -1.0)
+        competence_before = self.babbling.competence(context, goal)
+        if lesson is None:  # a request without a reply has the lowest competence and gain, so it is repeated rarely
+            self.goals.add(context, goal, competence=-1.0, strategy=strategy, gain=-1.0)
             yield from self.babbling.pursue(context, goal)
             return
         for _ in range(takes):
-            yield None
+            yield None  # a rest
         outcome_d = lesson.demonstration.outcome
-        executed: list[tuple[Array, Array]] = []
-        before_d = self.babbling.competence(context, outcome_d)
+        executed: list[tuple[Array, Array]] = []  # thetas and outcomes
+        competence_before_d = self.babbling.competence(context, outcome_d)
         try:
             yield from recording_outcomes(social.attempt(context, *lesson), executed)
-        finally:  # interruption by another demonstration included
+        finally:  # also if another demonstration interrupts
             outcomes = [outcome for _, outcome in executed]
-            self.babbling.conclude(context, goal, outcomes, before, strategy)
+            self.babbling.report_competence(context, goal, outcomes, competence_before, strategy)
             if self.problem.outcomes.contains(outcome_d):
-                self.babbling.conclude(context, outcome_d, outcomes, before_d, strategy)
+                self.babbling.report_competence(context, outcome_d, outcomes, competence_before_d, strategy)

@@ -14,7 +14,7 @@ import numpy as np
 
 from sgimd_torch.evaluation import Evaluation, OwnGoals
 from sgimd_torch.goals.regions import Region
-from sgimd_torch.spaces import Episode
+from sgimd_torch.spaces import Array, Episode
 
 DEPTH: Final = 3  # levels of the tree of regions, below its root, that have curves; so at most 15 regions have them
 
@@ -28,7 +28,8 @@ class Behaviour:
     """
 
     def __init__(self, tolerance: float, at_once: int = 1) -> None:
-        self.tolerance, self._own, self._movements = tolerance, OwnGoals(at_once), 0
+        self.tolerance, self.own, self._movements = tolerance, OwnGoals(at_once), 0
+        self.points: list[Array] = []  # context and goal, a point of C x T, for each goal of ``own``
         self._since: Counter[str] = Counter()  # number of movements since the last point, by tag
         self._imitated: list[float] = []  # distances missed by imitations since the last point
         self._demonstrations = self._answered = 0
@@ -47,7 +48,9 @@ class Behaviour:
         if move.origin == "imitate":
             self._imitated.append(float(np.linalg.norm(episode.outcome - move.goal)))
         elif move.origin != "global":
-            self._own.add(episode.index, move.goal, episode.outcome)
+            self.own.add(episode.index, move.goal, episode.outcome)
+            if len(self.points) < len(self.own.missed):
+                self.points.append(np.append(episode.context, move.goal))
 
     def curves(self) -> dict[str, float]:
         """Values of the curves by tag: shares and means since the last call, counts since the first movement."""
@@ -60,7 +63,7 @@ class Behaviour:
         if self._imitated:
             values["teacher/missed_by"] = float(np.mean(self._imitated))
             self._imitated.clear()
-        missed_by = self._own.recent(self._movements)
+        missed_by = self.own.recent_misses(self._movements)
         if len(missed_by):
             values["goals/reached"] = float((missed_by <= self.tolerance).mean())
             values["goals/missed_by"] = float(np.median(missed_by))
@@ -85,11 +88,12 @@ def region_curves(regions: Sequence[Region]) -> dict[str, float]:
     The means are over the remembered goals of all leaves below the node. A node without goals has no curve.
     """
     values: dict[str, float] = {"regions/count": len(regions)} if regions else {}
+    goals = {region: len(region.competences) for region in regions}
+    sums = {region: np.array([region.competences.sum(), goals[region] * region.interest()]) for region in regions}
     for path, leaves in branches(regions).items():
-        goals = [len(region.goals) for region in leaves]
-        if any(goals):
-            values[f"competence/{path}"] = float(np.concatenate([region.competences for region in leaves]).mean())
-            values[f"interest/{path}"] = float(np.average([region.interest() for region in leaves], weights=goals))
+        if n := sum(goals[region] for region in leaves):
+            competence, interest = sum((sums[region] for region in leaves), np.zeros(2)).tolist()
+            values[f"competence/{path}"], values[f"interest/{path}"] = competence / n, interest / n
     return values
 
 

@@ -17,10 +17,12 @@ LEGEND: Final[Mapping[str, str]] = {
     "--evaluated-by adds one. It compares what the learners remember, whatever their inverse models are.",
     "competence": "Mean competence of the goals that a region remembers: 0 is a goal that is met, -1 an outcome no "
     "better than rest. R is all of C x T, R0 and R1 are its two parts, R01 is a part of R0; map/competence shows the "
-    "regions. Each run has its own regions. After a cut of a region, its curve is the mean over its parts' goals.",
-    "interest": "Recent change of competence in a region, eq. (3). The learner draws more goals where interest is "
-    "high. After a cut of a region, its curve is the mean over its parts' goals.",
-    "regions": "Number of regions of the goal model.",
+    "regions. Each run has its own regions. After a cut of a region, its curve is the mean over its parts' goals. If "
+    "the goal model has no regions, as in practice, the board makes regions from the learner's own goals; the "
+    "competence of a goal is then that of its attempt's nearest outcome, eq. (7). The learner does not use them.",
+    "interest": "Recent change of competence in a region, eq. (3). A goal model with regions draws more goals where "
+    "interest is high. After a cut of a region, its curve is the mean over its parts' goals.",
+    "regions": "Number of regions of the goal model, or of those that the board makes.",
     "kind": "Share of each kind of movement since the last point: global exploration, local optimisation, imitation, "
     "babbling, rest, or failed movements.",
     "goals/met": "Share of the benchmark goals whose error is at most half the side of a benchmark tile.",
@@ -40,7 +42,8 @@ LEGEND: Final[Mapping[str, str]] = {
     "model/coverage": "Share of the newest outcomes that lie in the 80 % regions of their predictions.",
     "time": "Time (s) spent so far, by part of the run. Replayed movements have no times.",
     "map/competence": "Regions, named as in the curves, coloured by the mean competence of the goals they remember.",
-    "map/error": "Benchmark goals, coloured by their error at this evaluation.",
+    "map/error": "Benchmark goals, coloured by their error at this evaluation. The logarithmic scale depends on T "
+    "alone, so runs can be compared.",
 }
 
 

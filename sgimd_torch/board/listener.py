@@ -22,11 +22,13 @@ from tensorboardX.proto.summary_pb2 import Summary
 
 from sgimd_torch.board.curves import Behaviour, evaluation_curves, region_curves
 from sgimd_torch.board.legend import as_markdown, meaning_of
+from sgimd_torch.board.own_regions import OwnRegions
 from sgimd_torch.board.pictures import maps_of
 from sgimd_torch.evaluation import Benchmark, Evaluation
 from sgimd_torch.spaces import Box, Episode
 
 EVERY: Final = 50  # number of movements from one point of a curve to the next
+NO_REGIONS: Final = f"No competence per region: the learner pursued no goal of its own in its first {EVERY} movements."
 
 
 class EventFile:
@@ -100,6 +102,7 @@ class BoardListener(EventFile):
         self._space: Box = parts.environment.outcomes
         self._benchmark: Benchmark = parts.benchmark
         self._behaviour = Behaviour(parts.learner.problem.tolerance, parts.config.at_once)
+        self._own = OwnRegions(parts.learner.problem)
         self._movements = self._drawn_at = self._changes = 0
         self._explained: set[str] = set()
         # The result on TensorBoard's page of hyperparameters.
@@ -114,7 +117,12 @@ class BoardListener(EventFile):
         self._movements = episode.index + 1
         self._behaviour.episode(episode)
         if self._movements % EVERY == 0:
-            self._scalars({**self._behaviour.curves(), **region_curves(self._learner.regions)})
+            if not self._learner.regions:
+                self._own.follow(self._behaviour)
+            regions = self._learner.regions or self._own.regions
+            if not regions and self._movements == EVERY:
+                self.add(EVERY, summary.text("about/regions", NO_REGIONS))
+            self._scalars({**self._behaviour.curves(), **region_curves(regions)})
             if not replayed:
                 self._scalars({f"time/{name.removeprefix('seconds_')}": s for name, s in self._seconds().items()})
         self._scalars(self._curves())
@@ -133,8 +141,9 @@ class BoardListener(EventFile):
         self._scalars({**evaluation_curves(own, self._benchmark.side / 2), **others})
         if movements >= 2 * self._drawn_at or movements == self._config.movements:
             self._drawn_at = movements
-            for tag, picture in maps_of(self._learner.regions, self._space, goals, own.errors).items():
-                self._show(tag, summary.image(tag, picture, dataformats="HWC"), "images")
+            maps = maps_of(self._learner.regions or self._own.regions, self._space, goals, own.errors)
+            pictures = {tag: summary.image(tag, picture, dataformats="HWC") for tag, picture in maps.items()}
+            self._show("images", {tag: made.value[0] for tag, made in pictures.items()})
 
     def curves(self) -> Mapping[str, float]:
         """No numbers, because the board only draws those of other listeners."""
@@ -142,17 +151,19 @@ class BoardListener(EventFile):
 
     def _scalars(self, values: Mapping[str, float]) -> None:
         """Add a point to each curve; ``values`` are by tag, and values that are not finite are left out."""
-        for tag, value in values.items():
-            if math.isfinite(value):
-                self._show(tag, summary.scalar(tag, value), "scalars")
+        finite = {tag: value for tag, value in values.items() if math.isfinite(value)}
+        names = {tag: re.sub(r"[^-/\w.]", "_", tag) for tag in finite}  # as tensorboardX does, at a tenth of the time
+        self._show("scalars", {tag: Summary.Value(tag=names[tag], simple_value=finite[tag]) for tag in finite})
 
-    def _show(self, tag: str, made: Any, plugin: str) -> None:
-        """Add a summary to TensorBoard's page ``plugin``; the first summary of a tag carries the tag's explanation."""
-        if tag not in self._explained:
-            self._explained.add(tag)
-            made.value[0].metadata.summary_description = meaning_of(tag, self._space.unit)
-            made.value[0].metadata.plugin_data.plugin_name = plugin
-        self.add(self._movements, made)
+    def _show(self, plugin: str, values: Mapping[str, Any]) -> None:
+        """Add values to TensorBoard's page ``plugin``, in one event; the first one of a tag carries its explanation."""
+        for tag, value in values.items():
+            if tag not in self._explained:
+                self._explained.add(tag)
+                value.metadata.summary_description = meaning_of(tag, self._space.unit)
+                value.metadata.plugin_data.plugin_name = plugin
+        if values:
+            self.add(self._movements, Summary(value=[*values.values()]))
 
 
 def hparams_of(config: Any) -> dict[str, bool | float | str]:

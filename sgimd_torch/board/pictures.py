@@ -22,7 +22,8 @@ from sgimd_torch.figures.sections import Section, sections
 from sgimd_torch.goals.regions import Region
 from sgimd_torch.spaces import Array, Box
 
-SHARE: Final = 0.15  # error of the last colour, as a share of T's longest side; constant, so that runs can be compared
+# Errors of the first and the last colour, as shares of T's longest side; constant, so that runs can be compared.
+SCALE: Final = (0.0005, 0.15)
 NARROW: Final = 0.2  # share of the width of the map; the name of a narrower region is turned by 90 degrees
 WIDE: Final = 2.5  # width (inches) of the axes of a picture, without the colour bar
 MARGIN: Final = 0.7  # height (inches) of the space above and below the axes together
@@ -48,7 +49,8 @@ def maps_of(regions: Sequence[Region], space: Box, goals: Array, errors: Array) 
 
 def _errors(ax: Axes, goals: Array, errors: Array, space: Box, section: Section) -> None:
     ax.set_title(f"{len(errors)} benchmark goals, mean error {space.amount(float(errors.mean()), '.3f')}")
-    misses(ax, goals, errors, space, section, SHARE * float(space.sides.max()))
+    least, most = (share * float(space.sides.max()) for share in SCALE)
+    misses(ax, goals, errors, space, section, most, "error", least=least)
     ax.autoscale()  # limits around the goals, even in a large space
 
 
@@ -77,7 +79,7 @@ def _pixels(picture: Callable[[Axes, Section], object], maps: Sequence[Section])
     """The pixels of a picture with its sections side by side, as large as TensorBoard shows it."""
     size = (4.2 * len(maps), maps[0].height(WIDE) + MARGIN)
     with rc_context(STYLE):
-        figure = Figure(size, dpi=120, layout="constrained")
+        figure = Figure(size, dpi=120, layout="compressed")
         for ax, section in zip(figure.subplots(1, len(maps), squeeze=False).flat, maps, strict=True):
             picture(ax, section)
         canvas: Any = FigureCanvasAgg(figure)

@@ -28,16 +28,8 @@ _DRIFT: Final = 0.12  # number that the CUSUM loses with each movement
 _SUSPICIOUS: Final = 3.0  # CUSUM from which on a change is suspected
 _FIRST: Final = 50  # least number of exemplars before a change is suspected
 _PREDICTED: Final = 30  # least number of predictions in an era before a change is suspected
-_TESTED_AFTER: Final = (
-    16,
-    24,
-    36,
-    54,
-    81,
-    122,
-    182,
-    273,
-)  # numbers of movements since a suspicion at which it is tested
+# Numbers of movements since a suspicion at which it is tested.
+_TESTED_AFTER: Final = (16, 24, 36, 54, 81, 122, 182, 273)
 _EVERY: Final = 64  # number of movements between two tests without a suspicion
 _SLOW: Final = 128  # number of last movements that such a test compares
 _FAILED: Final = 6.0  # squared error, relative to the expected one, above which a prediction has failed
@@ -115,11 +107,11 @@ class ChangeDetector:
         n = len(self.life)
         if self._suspected_at < 0 and self._review and n - self.since >= self._review:
             return self._restart(is_new=False)
-        m = self._suspected(process, n)
-        if m and (m := self._changed(process, m)):
-            fitted, before = process.fitted(), Exemplars.of(process.memory, slice(len(process.memory) - m))
+        n_last = self._suspected(process, n)
+        if n_last and (n_last := self._changed(process, n_last)):
+            fitted, before = process.fitted(), Exemplars.of(process.memory, slice(len(process.memory) - n_last))
             assert fitted is not None
-            self._eras, self.since = [*self._eras, Era(fitted, before)][-_ERAS:], n - m
+            self._eras, self.since = [*self._eras, Era(fitted, before)][-_ERAS:], n - n_last
             return self._restart(is_new=True)
         return None
 
@@ -139,82 +131,83 @@ class ChangeDetector:
         """How many of the last movements to test now."""
         if self._suspected_at < 0:
             return self._drifted(process, n)
-        m = n - self._suspected_at
-        due = sum(m >= moment for moment in _TESTED_AFTER)
+        n_since = n - self._suspected_at
+        due = sum(n_since >= moment for moment in _TESTED_AFTER)
         if due > self._n_tests:
             self._n_tests = due
-            return m
-        if self._cusum == 0 or m > _TESTED_AFTER[-1]:
+            return n_since
+        if self._cusum == 0 or n_since > _TESTED_AFTER[-1]:
             self._reset_suspicion()
         return 0
 
     def _drifted(self, process: LocalProcess, n: int) -> int:
         """Without a suspicion, how many of the last movements predict each other better than they were predicted."""
-        m, fitted = _SLOW, process.fitted()
+        n_last, fitted = _SLOW, process.fitted()
         if n - self._compared < _EVERY or fitted is None:
             return 0
         self._compared = n
-        if len(self._errors) < m or len(process.memory) < 4 * m:
+        if len(self._errors) < n_last or len(process.memory) < 4 * n_last:
             return 0
-        others, _ = Era(fitted, Exemplars.of(process.memory, slice(-m, None))).left_out(np.arange(m))
-        return m if self._better(np.array(self._errors[-m:]), others) >= _SURE else 0
+        recent = Era(fitted, Exemplars.of(process.memory, slice(-n_last, None)))
+        errors, _ = recent.left_out(np.arange(n_last))
+        return n_last if self._better(np.array(self._errors[-n_last:]), errors) >= _SURE else 0
 
     @one_thread
-    def _changed(self, process: LocalProcess, m: int) -> int:
-        """How many of the last ``m`` movements are of another era."""
+    def _changed(self, process: LocalProcess, n_last: int) -> int:
+        """How many of the last ``n_last`` movements are of another era."""
         fitted, memory, n = process.fitted(), process.memory, len(process.memory)
-        if fitted is None or n - m < _PREDICTED:
+        if fitted is None or n - n_last < _PREDICTED:
             return 0
-        rows = np.arange(max(n - m, n - _TESTED), n)
-        told, before = Exemplars.of(memory, rows), Era(fitted, Exemplars.of(memory, slice(n - m)))
-        expected, variances, _ = before.predict(told)
-        as_it_was, failed = squared(expected - told.outcomes), variances * _FAILED * memory.outcome_dim
+        rows = np.arange(max(n - n_last, n - _TESTED), n)
+        tested, earlier = Exemplars.of(memory, rows), Era(fitted, Exemplars.of(memory, slice(n - n_last)))
+        expected, variances, _ = earlier.predict(tested)
+        as_it_was, failed = squared(expected - tested.outcomes), variances * _FAILED * memory.outcome_dim
         # If nothing had changed, both would predict; the first errs more where noise has grown.
-        nulls = Era(fitted, Exemplars.of(memory)).left_out(rows)[0], as_it_was
-        alone, _ = Era(fitted, told).left_out(np.arange(len(rows)))
-        for other in (alone, by_halves(before, self.problem.policies, told)):
-            for which in (slice(None), as_it_was > failed):  # a local change is seen in those that failed
-                if all(self._better(null[which], other[which]) >= _SURE for null in nulls):
+        unchanged = Era(fitted, Exemplars.of(memory)).left_out(rows)[0], as_it_was
+        of_each_other, _ = Era(fitted, tested).left_out(np.arange(len(rows)))
+        for errors in (of_each_other, by_halves(earlier, self.problem.policies, tested)):
+            for some in (slice(None), as_it_was > failed):  # a local change is seen in those that failed
+                if all(self._better(unchanged_errors[some], errors[some]) >= _SURE for unchanged_errors in unchanged):
                     # The suspicion may have begun too early: the first movements then fit the old era better.
                     gains = np.zeros(len(rows))
-                    gains[which] = self._gains(as_it_was, other)[which]
-                    last = 1 + int(gains[::-1].cumsum().argmax())
-                    return m if last == len(rows) else last
+                    gains[some] = self._gains(as_it_was, errors)[some]
+                    n_changed = 1 + int(gains[::-1].cumsum().argmax())
+                    return n_last if n_changed == len(rows) else n_changed
         return 0
 
-    def _gains(self, errors: Array, others: Array) -> Array:
+    def _gains(self, errors: Array, other_errors: Array) -> Array:
         """By how much others predict better: log ratios of errors; noise limits both."""
         floor = self.noise**2 + 1e-300
-        return np.clip(0.5 * np.log((errors + floor) / (others + floor)), -_LARGEST_GAIN, _LARGEST_GAIN)
+        return np.clip(0.5 * np.log((errors + floor) / (other_errors + floor)), -_LARGEST_GAIN, _LARGEST_GAIN)
 
-    def _better(self, errors: Array, others: Array) -> float:
+    def _better(self, errors: Array, other_errors: Array) -> float:
         """T, self-normalised: how sure it is that others predict better."""
-        gains = self._gains(errors, others)
+        gains = self._gains(errors, other_errors)
         return float(gains.sum() / np.sqrt(squared(gains) + 1e-300))
 
     @one_thread
     def _restart(self, *, is_new: bool) -> Restart:
         """Exemplars of earlier eras that help to predict this one, then all of this one."""
-        now = Exemplars.of(self.life, slice(self.since, None))
-        n, kept, before, best = len(now.thetas), now.some(slice(0)), 0, -np.inf
-        test = np.arange(max(0, n - _TESTED), n)
-        told = now.some(test)
+        current = Exemplars.of(self.life, slice(self.since, None))
+        n, kept, n_before, best = len(current.thetas), current.some(slice(0)), 0, -np.inf
+        tested_rows = np.arange(max(0, n - _TESTED), n)
+        tested = current.some(tested_rows)
         for era in self._eras:
-            mine, _ = self._process(now, era).left_out(test)
-            errors = [era.errors(told)]
-            errors += [by_halves(era, self.problem.policies, told)] if n >= _CALIBRATED else []
-            for calibration, of_era in enumerate(errors):
-                if (gain := float(self._gains(mine, of_era).mean())) > best:
-                    best, chosen, calibrated, alone = gain, era, bool(calibration), mine
+            own_errors, _ = self._process(current, era).left_out(tested_rows)
+            errors = [era.errors(tested)]
+            errors += [by_halves(era, self.problem.policies, tested)] if n >= _CALIBRATED else []
+            for calibration, era_errors in enumerate(errors):
+                if (gain := float(self._gains(own_errors, era_errors).mean())) > best:
+                    best, chosen, calibrated, alone = gain, era, bool(calibration), own_errors
         if self._eras:
             self._eras = [*(era for era in self._eras if era is not chosen), chosen]
-            helpful, before = self._helpful(chosen, calibrated, now, test), len(chosen.exemplars.thetas)
-            together, _ = self._process(helpful.and_then(now), chosen).left_out(len(helpful.thetas) + test)
+            helpful, n_before = self._helpful(chosen, calibrated, current, tested_rows), len(chosen.exemplars.thetas)
+            together, _ = self._process(helpful.and_then(current), chosen).left_out(len(helpful.thetas) + tested_rows)
             kept = helpful if self._gains(alone, together).mean() >= 0 else kept
         self._review, self._errors = _GROWTH * n if len(kept.thetas) else 0, []
         if is_new:
             self._reset_suspicion()
-        return Restart(kept.and_then(now), len(kept.thetas), before, is_new)
+        return Restart(kept.and_then(current), len(kept.thetas), n_before, is_new)
 
     def _process(self, exemplars: Exemplars, era: Era) -> Era:
         """A process of these exemplars; if they are few, with lengths and kernel of an earlier era."""
@@ -222,21 +215,22 @@ class ChangeDetector:
         fitted = None if few else LocalProcess(self.problem.over(exemplars.memory)).fitted()
         return Era(fitted or era.fitted, exemplars)
 
-    def _helpful(self, era: Era, calibrated: bool, now: Exemplars, test: Rows) -> Exemplars:
+    def _helpful(self, era: Era, calibrated: bool, current: Exemplars, tested_rows: Rows) -> Exemplars:
         """Exemplars of an earlier era, as they would come out now, where they are surer than those of now.
 
         What a calibration leaves unexplained is a process, too.
         """
         calibration = Calibration(era, self.problem.policies)
         if calibrated:
-            calibration.fit(now.some(test))
-        left = now._replace(outcomes=now.outcomes - calibration.predict(now))
-        before = calibration.translated(max(float(np.median(squared(left.outcomes[test]))), self.noise**2))
-        of_left, alone = self._process(left, era), self._process(now, era)
-        wrong, variances, _ = of_left.predict(before)
-        without = alone.predict(before)[1] * alone.inflation(test)
-        corrected = before._replace(outcomes=before.outcomes + wrong)
-        return corrected.some(variances * of_left.inflation(test) < _SURER * without)
+            calibration.fit(current.some(tested_rows))
+        unexplained = current._replace(outcomes=current.outcomes - calibration.predict(current))
+        largest_variance = max(float(np.median(squared(unexplained.outcomes[tested_rows]))), self.noise**2)
+        before = calibration.translated(largest_variance)
+        of_unexplained, alone = self._process(unexplained, era), self._process(current, era)
+        correction, variances, _ = of_unexplained.predict(before)
+        variances_alone = alone.predict(before)[1] * alone.inflation(tested_rows)
+        corrected = before._replace(outcomes=before.outcomes + correction)
+        return corrected.some(variances * of_unexplained.inflation(tested_rows) < _SURER * variances_alone)
 
 
 def _fourth_fifth(values: list[float]) -> float:

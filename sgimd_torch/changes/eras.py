@@ -1,6 +1,6 @@
 """An era: exemplars of a time in which the robot stayed the same, and predictions from them.
 
-era = Era(fitted, exemplars); outcomes, variances, slopes = era.predict(contexts, thetas)
+era = Era(fitted, exemplars); outcomes, variances, slopes = era.predict(movements)
 """
 
 from __future__ import annotations
@@ -57,15 +57,15 @@ class Era:
         self._neighbours = Neighbours(Table(inputs.shape[1]))
         self._neighbours.keys.append(inputs)
 
-    def predict(self, asked: Exemplars) -> tuple[Array, Array, Array]:
+    def predict(self, movements: Exemplars) -> tuple[Array, Array, Array]:
         """Outcomes ``(n, outcome_dim)``, variances ``(n,)`` with noise, slopes ``(n, outcome_dim, theta_dim)``."""
-        points, dim = self._in_lengths(asked), asked.thetas.shape[1]
+        points, dim = self._in_lengths(movements), movements.thetas.shape[1]
         expected, variances, slopes = self._predict(self._neighbours.nearest(points, NEAR), points)
         return expected, variances, slopes[:, :, :dim] / self.fitted.units[1, :dim]
 
-    def errors(self, told: Exemplars) -> Array:
+    def errors(self, movements: Exemplars) -> Array:
         """Squared errors ``(n,)`` of predicting these movements."""
-        return squared(self.predict(told)[0] - told.outcomes)
+        return squared(self.predict(movements)[0] - movements.outcomes)
 
     def left_out(self, rows: Rows) -> tuple[Array, Array]:
         """Squared errors ``(n,)`` of predicting each of these rows from all other rows, and their variances."""
@@ -80,8 +80,8 @@ class Era:
         errors, variances = self.left_out(rows)
         return float(errors.sum() / (variances.sum() * self.exemplars.outcomes.shape[1] + 1e-300))
 
-    def _in_lengths(self, some: Exemplars) -> Array:
-        raw, (origin, size) = np.concatenate((some.thetas, some.contexts), axis=1), self.fitted.units
+    def _in_lengths(self, exemplars: Exemplars) -> Array:
+        raw, (origin, size) = np.concatenate((exemplars.thetas, exemplars.contexts), axis=1), self.fitted.units
         return np.asarray((raw - origin) / size)
 
     def _predict(self, near: Rows, points: Array) -> tuple[Array, Array, Array]:

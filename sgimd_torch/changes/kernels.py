@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from sgimd_torch.inverses.kernels import covariances, expected, fitted_process, unknown
-from sgimd_torch.memory.jit import LISTS, NUMBERS, TABLE, columns, compiled_for
+from sgimd_torch.inverses.kernels import covariances, expected, fitted_process, variance_at
+from sgimd_torch.memory.jit import LISTS, NUMBERS, TABLE, as_columns, compiled_for
 from sgimd_torch.spaces import Array
 
 
@@ -27,11 +27,11 @@ def predict(
     covariance, slope = np.empty(near.shape[1]), np.empty(near.shape[1])
     for i in range(n):
         rows, point = near[i].copy(), points[i].copy()
-        process = fitted_process(columns(inputs, rows), columns(outcomes, rows), kernel)
+        process = fitted_process(as_columns(inputs, rows), as_columns(outcomes, rows), kernel)
         covariances(process.inputs, kernel, point, covariance, slope)
         predictions[i] = expected(process, covariance)
-        variances[i] = unknown(process, covariance) + process.variance * kernel[3]
+        variances[i] = variance_at(process, covariance) + process.variance * kernel[3]
         for k in range(m):
-            pull = process.weights[k] * slope
-            slopes[i, k] = point * pull.sum() - process.inputs @ pull
+            weighted_slopes = process.weights[k] * slope
+            slopes[i, k] = point * weighted_slopes.sum() - process.inputs @ weighted_slopes
     return predictions, variances, slopes

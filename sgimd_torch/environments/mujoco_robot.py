@@ -36,7 +36,7 @@ from sgimd_torch.environments.mujoco_model import (
 )
 from sgimd_torch.environments.protocol import Primitive, SimulationError, check_movement, check_robot
 from sgimd_torch.environments.sketch import Sketch
-from sgimd_torch.options.catalogue import unknown
+from sgimd_torch.options.catalogue import unknown_name_error
 from sgimd_torch.spaces import Array, Box, check_count, check_point, check_rng, read_only, stream
 
 EXPLORED: Final = 300  # number of random movements that find T
@@ -266,7 +266,7 @@ class MujocoRobot:
         if keyframe:
             names = [self.model.key(k).name for k in range(self.model.nkey)]
             if keyframe not in names:
-                raise unknown(f"keyframe of {file}", keyframe, names)
+                raise unknown_name_error(f"keyframe of {file}", keyframe, names)
             mujoco.mj_resetDataKeyframe(self.model, data, names.index(keyframe))
         mujoco.mj_forward(self.model, data)
         held = holding(self.model, data)

@@ -7,15 +7,16 @@ Section 2.1 of Nguyen & Oudeyer (2014): M(c, theta) = tau. An environment of you
 
 from __future__ import annotations
 
+import traceback
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.spaces import Array, Box, check_point, check_vector, first_entry
+from sgimd_torch.spaces import Array, Box, Failure, check_point, check_vector, first_entry, read_only
 
 MEMBERS: Final = ("contexts", "policies", "outcomes", "rest", "outcome_noise", "observe", "execute")
 
@@ -72,16 +73,6 @@ class BatchEnvironment(Environment, Protocol):
 
         A movement without an outcome has a row of NaN. An exception means that no movement has an outcome.
         """
-        ...
-
-
-@runtime_checkable
-class RobotCount(Protocol):
-    """An environment that cannot make any number of movements at once, such as the driver of a single robot."""
-
-    @property
-    def at_once(self) -> int:
-        """Largest number of movements at once."""
         ...
 
 
@@ -189,50 +180,48 @@ def observed(environment: Environment, rng: np.random.Generator) -> Array:
     return clipped
 
 
+def tried(name: str, dim: int, robot: Callable[..., ArrayLike], *given: Any) -> Array | Failure:
+    """Result of a call of the robot, as ``(dim,)`` finite numbers, read-only, or why there is none."""
+    try:
+        return read_only(check_point(name, robot(*given), dim))
+    except (Exception, SystemExit) as error:  # no failure of a robot may end a run or an evaluation
+        return Failure(reason_of(error), error)
+
+
+def reason_of(error: BaseException) -> str:
+    """Reason why a robot failed, in one line of at most 300 printable characters."""
+    simulated = isinstance(error, SimulationError)
+    said = str(error) if simulated else "".join(traceback.format_exception_only(error))
+    return "".join(sign if sign.isprintable() else " " for sign in said)[:300].strip()
+
+
 def execute_many(
-    environment: Environment, contexts: ArrayLike, thetas: ArrayLike, rngs: Sequence[np.random.Generator]
-) -> Array:
-    """Execute many movements, together if the environment is a `BatchEnvironment`, else one by one.
+    environment: Environment,
+    contexts: Sequence[Array] | Array,
+    thetas: Sequence[Array] | Array,
+    rngs: Sequence[np.random.Generator],
+) -> list[Array | Failure]:
+    """The outcome ``(outcome_dim,)`` of each movement, or why it has none; the environment gets copies.
+
+    A `BatchEnvironment` executes the movements together; if it raises, all of them have failed.
 
     Args:
         environment: environment of the movements.
-        contexts: ``(n, context_dim)`` in C.
-        thetas: ``(n, theta_dim)`` in Pi.
-        rngs: n streams, one for each movement, so that no outcome depends on other movements of the batch.
-
-    Returns:
-        ``(n, outcome_dim)``, row i equal to ``environment.execute(contexts[i], thetas[i], rngs[i])`` bit for bit.
-
-    Raises:
-        ValueError: the numbers of rows differ, a row lies outside C or Pi, or the environment returns anything but
-            outcomes.
-        SimulationError: a movement has no finite outcome.
+        contexts: contexts in C.
+        thetas: thetas in Pi.
+        rngs: a stream for each movement, so that no outcome depends on other movements.
     """
-    # Copies, because an environment may change its arguments.
-    contexts = environment.contexts.check("contexts", contexts).copy()
-    thetas = environment.policies.check("thetas", thetas, "were goals passed instead?").copy()
-    if not contexts.ndim == thetas.ndim == 2 or not len(contexts) == len(thetas) == len(rngs):
-        raise ValueError(f"needs n contexts, thetas, rngs, got {contexts.shape}, {thetas.shape} and {len(rngs)} rngs")
-    if len(thetas) == 0:
-        return np.empty((0, environment.outcomes.dim))
-    dim = environment.outcomes.dim
-    if len(thetas) > 1 and isinstance(environment, BatchEnvironment):
-        outcomes = _numbers("execute_many()", environment.execute_many(contexts, thetas, rngs), len(thetas), dim)
-    else:
-        moved = [environment.execute(*movement) for movement in zip(contexts, thetas, rngs, strict=True)]
-        outcomes = np.stack([_numbers(f"execute() of movement {k}", outcome, dim) for k, outcome in enumerate(moved)])
-    lost = np.flatnonzero(~np.isfinite(outcomes).all(axis=1))
-    if len(lost):
-        raise SimulationError("the outcome is not finite", thetas[lost[0]])
-    return outcomes
-
-
-def _numbers(what: str, value: Any, *shape: int) -> Array:
-    array = np.asarray(value)
-    if array.shape != shape or array.dtype.kind not in "fiu":
-        got = type(value).__name__ if array.ndim == 0 else f"{array.dtype} {array.shape}"
-        raise ValueError(f"{what} must give numbers of shape {shape}, got {got}; is there a return?")
-    return array.astype(np.float64)
+    n, dim = len(thetas), environment.outcomes.dim
+    if n > 1 and isinstance(environment, BatchEnvironment):
+        try:
+            outcomes = np.asarray(environment.execute_many(np.array(contexts), np.array(thetas), rngs))
+            if outcomes.shape != (n, dim):
+                raise ValueError(f"execute_many() must give {n} outcomes in rows, ({n}, {dim}), got {outcomes.shape}")
+        except (Exception, SystemExit) as error:
+            return [Failure(reason_of(error), error)] * n
+        return [tried("outcome", dim, np.copy, outcome) for outcome in outcomes]
+    moves = zip(contexts, thetas, rngs, strict=True)
+    return [tried("outcome", dim, environment.execute, c.copy(), theta.copy(), rng) for c, theta, rng in moves]
 
 
 def check_movement(environment: Environment, context: ArrayLike, theta: ArrayLike) -> tuple[Array, Array]:

@@ -5,29 +5,17 @@ Sketch(outcome, 0.05, [arm, puck])        # result of a method trace(context, th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.spaces import Array, read_only
 
-
-class Trace(Protocol):
-    """A movement that can be filmed: a `Sketch`, or the `RodTrace` of the fishing rod."""
-
-    @property
-    def outcome(self) -> Array:
-        """``(outcome_dim,)``, equal to the outcome of ``execute`` with an equal random stream."""
-        ...
-
-    @property
-    def landed(self) -> float:
-        """Time (s) from the start of the movement until its outcome is reached."""
-        ...
+if TYPE_CHECKING:
+    from sgimd_torch.environments.rod_physics import RodTrace
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,31 +65,18 @@ def _drawn(name: str, given: ArrayLike, wanted: str, axes: int) -> Array:
     return read_only(value.astype(np.float64))
 
 
-@runtime_checkable
-class Drawn(Protocol):
-    """An environment whose movements can be filmed."""
-
-    def trace(self, context: Array, theta: Array, rng: np.random.Generator) -> Trace:
-        """The trajectory of a movement. Its outcome must equal that of ``execute`` with an equal random stream."""
-        ...
-
-
-Tracer = Callable[[Array, Array, np.random.Generator], Trace]
-"""Function (context, theta, rng) -> movement that can be filmed."""
-
-
-def traced(environment: Environment, trace: Tracer, context: Array, theta: Array, rng: np.random.Generator) -> Trace:
-    """Call ``trace``, the optional method of ``environment``, and check the result.
+def traced(environment: Any, context: Array, theta: Array, rng: np.random.Generator) -> RodTrace | Sketch:
+    """Call the optional method ``trace`` of an environment, and check the result.
 
     Raises:
         ValueError: ``trace`` fails, or its result cannot be drawn.
     """
     name, dim = type(environment).__name__, environment.outcomes.dim
     try:
-        movement = trace(context, theta, rng)
+        movement: Any = environment.trace(context, theta, rng)
     except Exception as error:  # code of the user may raise anything
         raise ValueError(f"trace() of {name} failed: {type(error).__name__}: {error}") from error
-    if hasattr(movement, "states"):  # the RodTrace of the fishing rod
+    if hasattr(movement, "states"):  # the RodTrace of the fishing rod, or a Filmed
         return movement
     if not isinstance(movement, Sketch) or len(movement.outcome) != dim:
         what = f"one of {len(movement.outcome)}" if isinstance(movement, Sketch) else type(movement).__name__

@@ -12,6 +12,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colorbar import Colorbar
+from matplotlib.colors import LogNorm
+from matplotlib.ticker import LogLocator, NullLocator
 from numpy.typing import ArrayLike
 
 from sgimd_torch.spaces import Array, Box, rounded
@@ -62,7 +64,12 @@ def colour_bar(ax: Axes, drawn: ScalarMappable, label: str, *, extend: str = "ne
     """Add a colour bar for ``drawn`` beside ``ax``; ``extend`` says which ends are arrows: "neither", "max" ..."""
     figure = ax.get_figure()
     assert figure is not None
-    return figure.colorbar(drawn, ax=ax, label=label, extend=extend)
+    bar = figure.colorbar(drawn, ax=ax, label=label, extend=extend)
+    if isinstance(drawn.norm, LogNorm):
+        bar.ax.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        bar.ax.yaxis.set_major_formatter("{x:g}")
+        bar.ax.yaxis.set_minor_locator(NullLocator())
+    return bar
 
 
 def note(ax: Axes, text: str) -> None:

@@ -12,9 +12,8 @@ import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.collections import PatchCollection, QuadMesh
-from matplotlib.colors import ListedColormap, LogNorm
+from matplotlib.colors import ListedColormap, LogNorm, Normalize
 from matplotlib.patches import Rectangle
-from matplotlib.ticker import LogLocator, NullLocator
 
 from sgimd_torch.figures.axes import alike, colour_bar, note
 from sgimd_torch.figures.names import COLOURS, NAMES
@@ -55,10 +54,7 @@ def landing_points(
     mesh = ax.pcolormesh(*edges, tiles, norm=norm, cmap=blues)
     same_scale = box.dim == 2 and alike(box.sides)
     label = f"movements on a tile of {box.amount(side)}" if same_scale else "movements on a tile"
-    bar = colour_bar(ax, mesh, label)
-    bar.ax.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-    bar.ax.yaxis.set_major_formatter("{x:g}")
-    bar.ax.yaxis.set_minor_locator(NullLocator())
+    colour_bar(ax, mesh, label)
     if demonstrated is not None:
         different = np.unique(demonstrated, axis=0)
         crosses, label = section.points(different), f"{len(different)} demonstrated outcomes"
@@ -110,7 +106,7 @@ def competence_map(ax: Axes, lows: Array, highs: Array, competences: Array, sect
     low = min(np.floor(least / step) * step, -step)
     span = low, max(np.ceil(most / step) * step, low + step)
     drawn = _regions_in(ax, lows, highs, np.ma.masked_invalid(competences), section, "viridis", span)
-    colour_bar(ax, drawn, "mean competence (0: goals met)")
+    colour_bar(ax, drawn, "mean competence")
     section.frame(ax)
     return drawn
 
@@ -123,6 +119,8 @@ def misses(
     section: Section,
     most: float,
     label: str = "distance from goal to outcome",
+    *,
+    least: float = 0.0,
 ) -> None:
     """Goals of an evaluation, coloured by their error; if T has one dimension, the y axis shows the error instead.
 
@@ -134,6 +132,7 @@ def misses(
         section: dimensions to show.
         most: error at the upper end of the colour scale.
         label: name of the errors, without their unit.
+        least: error at the lower end of the colour scale, which is logarithmic unless it is 0.
     """
     label = space.in_unit(label)
     if section.is_strip:
@@ -142,7 +141,9 @@ def misses(
         ax.set_ylim(bottom=0)
         return
     x, y = section.points(goals).T
-    drawn = ax.scatter(x, y, c=errors, s=14, cmap="viridis_r", vmin=0, vmax=most, edgecolors="none")
+    norm = LogNorm(least, most) if least else Normalize(0, most)
+    shown = np.maximum(errors, least)  # a logarithmic scale would leave out an error of 0
+    drawn = ax.scatter(x, y, c=shown, s=14, cmap="viridis_r", norm=norm, edgecolors="none")
     colour_bar(ax, drawn, label, extend="max")
     section.frame(ax)
 

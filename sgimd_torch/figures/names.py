@@ -10,6 +10,7 @@ from typing import Final
 _DRAWN: Final = {
     "random": ("Random", "#7f7f7f"),
     "sagg-riac": ("SAGG-RIAC", "#0072b2"),
+    "sagg-riac-letter": ("SAGG-RIAC, to the letter", "#117733"),
     "practice": ("Practice", "#332288"),
     "practice-middle": ("From the middle only", "#ddcc77"),
     "practice-interest": ("Practice, by interest", "#88ccee"),
@@ -17,6 +18,7 @@ _DRAWN: Final = {
     "observation": ("Observation", "#cc79a7"),
     "imitation": ("Imitation", "#009e73"),
     "sgim-d": ("SGIM-D", "#d55e00"),
+    "sgim-d-letter": ("SGIM-D, to the letter", "#b8860b"),
     "sgim-im": ("SGIM-IM", "#661100"),
     "sgim-im-search": ("SGIM-IM, search", "#a05a2c"),
     "sgim-acts": ("SGIM-ACTS", "#cc6677"),

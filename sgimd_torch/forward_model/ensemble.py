@@ -57,6 +57,7 @@ class Ensemble(LightningModule):
             x = torch.baddbmm(bias, torch.nn.functional.silu(x) if layer else x, weight)
         mean, log_variance = x.chunk(2, dim=-1)
         if not self.noise_heads:
+            # The noise is the last layer's bias alone.
             log_variance = self.biases[-1].chunk(2, dim=-1)[1].expand_as(mean)
         return mean, log_variance.clamp(*_LOG_VARIANCES)
 

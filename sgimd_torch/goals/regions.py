@@ -1,8 +1,8 @@
-"""Regions of C x T with their interest, and the choice of a goal from regions that tile C x T.
+"""Regions of C x T (contexts x outcomes) with their interest, and the choice of a goal from regions that tile C x T.
 
 Sections 3.2.1 and 3.2.2, eqs. (3) and (4) of Nguyen & Oudeyer (2014). The interest of a region is its competence
-progress, over a sliding window of the last goals that were attempted there. A map cuts C x T into regions and gives
-them to a `Tiling`.
+progress, over a sliding window of the last goals that were attempted there. `InterestMap` cuts C x T into regions and
+gives them to a `Tiling`.
     tiling.tile(regions); goal = tiling.sample(context); index = tiling.add(context, goal, competence, strategy, gain)
 """
 
@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,8 +19,6 @@ from sgimd_torch.goals.uniform import check_attempt, check_in
 from sgimd_torch.parts import Problem
 from sgimd_torch.spaces import Array, Box
 
-# Probabilities of the paper's modes: a goal where interest is high (1), anywhere (2), where competence is least (3).
-_MODES: Final = (0.7, 0.2, 0.1)
 Progress = Callable[[Array, Array, Array], float]
 """Function (points, competences, gains) of n >= 4 goals, oldest first -> progress. Points ``(n, dim)`` of C x T are
 contexts and goals. Competences ``(n,)`` and gains ``(n,)`` are arguments of `Goals.add`, one for each goal."""
@@ -56,7 +53,7 @@ def interest_of(points: Array, competences: Array, gains: Array, *, window: int,
     return progress(points[-window:], competences[-window:], gains[-window:])
 
 
-def between_interests(region: Region, below: NDArray[np.bool_]) -> float:
+def interest_difference(region: Region, below: NDArray[np.bool_]) -> float:
     """Difference of the interests on the two sides of a cut; ``below`` ``(n,)`` marks the goals on one side."""
     return abs(region.interest_among(below) - region.interest_among(~below))
 
@@ -68,7 +65,9 @@ class Region:
     ``path`` is the name of the region: "R" is the root, "R0" its half below the cut, "R1" its half above the cut, and
     "R01" the upper half of "R0". ``low`` and ``high`` are the corners in C x T. ``points``
     ``(n, context_dim + outcome_dim)``, ``competences``, ``gains`` and ``strategies`` ``(n,)`` have a row for each goal.
-    ``attempts`` also counts goals that the region forgot, but not goals that its parent forgot. Arrays are read-only.
+    ``strategies`` are names, for goal models that choose strategies. ``attempts`` is the number of goals since this
+    region was split off, forgotten ones included. ``interest_function`` is `interest_of` with its options. Arrays are
+    read-only.
     """
 
     path: str
@@ -80,7 +79,7 @@ class Region:
     gains: Array
     strategies: NDArray[np.str_]
     attempts: int
-    progress: Progress
+    interest_function: Progress
 
     def __post_init__(self) -> None:
         for name in ("low", "high", "points", "competences", "gains", "strategies"):
@@ -104,21 +103,21 @@ class Region:
 
     def interest_among(self, rows: NDArray[np.bool_] | slice) -> float:
         """Interest over the goals in ``rows`` alone."""
-        return self.progress(self.points[rows], self.competences[rows], self.gains[rows])
+        return self.interest_function(self.points[rows], self.competences[rows], self.gains[rows])
 
     @cached_property
     def _interest(self) -> float:
         return self.interest_among(slice(None))
 
-    def extend(self, point: Array, competence: float, gain: float, strategy: str) -> Region:
-        """This region with one more goal."""
+    def extend(self, point: Array, competence: ArrayLike, gain: ArrayLike, strategy: ArrayLike) -> Region:
+        """This region with one more goal, or with an array of ``n`` more goals, the oldest first."""
         return replace(
             self,
             points=np.vstack((self.points, point)),
             competences=np.append(self.competences, competence),
             gains=np.append(self.gains, gain),
             strategies=np.append(self.strategies, strategy),
-            attempts=self.attempts + 1,
+            attempts=self.attempts + np.size(competence),
         )
 
     def keep(self, rows: NDArray[np.bool_] | slice) -> Region:
@@ -146,7 +145,9 @@ class Tiling:
 
     Args:
         problem: problem to learn.
-        progress: function (points, competences, gains) -> interest of a region.
+        interest_function: function (points, competences, gains) -> interest of a region.
+        modes: probabilities of the paper's modes: a goal where interest is high (1), anywhere (2), where competence is
+            least (3).
         near: largest distance from a region's goal of least competence at which mode 3 draws a new goal, relative to
             the region's sides.
 
@@ -154,18 +155,23 @@ class Tiling:
         ValueError: a number is out of its range.
     """
 
-    def __init__(self, problem: Problem, progress: Progress, *, near: float) -> None:
+    def __init__(
+        self, problem: Problem, interest_function: Progress, *, modes: tuple[float, float, float], near: float
+    ) -> None:
+        if len(modes) != 3 or not (min(modes) >= 0 and abs(sum(modes) - 1) < 1e-9):
+            raise ValueError(f"modes must be three probabilities with the sum 1, got {modes}")
         if not 0 < near <= 1:
             raise ValueError(f"near must lie in (0, 1], got {near}; it is a fraction of a region's sides")
-        self.problem, self._near, self._progress, self._rng = problem, near, progress, problem.stream("goals")
+        self.problem, self._modes, self._near = problem, modes, near
+        self._interest_function, self._rng = interest_function, problem.stream("goals")
         contexts, outcomes = problem.contexts, problem.outcomes
         self.box = Box(np.concatenate((contexts.low, outcomes.low)), np.concatenate((contexts.high, outcomes.high)))
-        self.tile([self.region("R", self.box.low, self.box.high)])
+        self.tile([self._empty_region("R", self.box.low, self.box.high)])
 
-    def region(self, path: str, low: Array, high: Array) -> Region:
+    def _empty_region(self, path: str, low: Array, high: Array) -> Region:
         """A region without goals."""
         nothing = np.empty((0, self.box.dim)), np.empty(0), np.empty(0), np.empty(0, dtype=np.str_)
-        return Region(path, low, high, self.problem.contexts.dim, *nothing, 0, self._progress)
+        return Region(path, low, high, self.problem.contexts.dim, *nothing, 0, self._interest_function)
 
     def tile(self, regions: list[Region]) -> None:
         """Use these regions from now on; they must tile C x T."""
@@ -185,7 +191,7 @@ class Tiling:
     def sample(self, context: ArrayLike) -> Array:
         """Decide a goal, section 3.2.2: choose a mode, a region that contains the context, and a goal in it."""
         context = check_in(self.problem.contexts, "context", context)
-        mode = 1 + self._rng.choice(3, p=_MODES)
+        mode = 1 + self._rng.choice(3, p=self._modes)
         if mode == 2:
             return self.problem.outcomes.sample(self._rng)
         region = self._choose(context)
@@ -193,7 +199,7 @@ class Tiling:
         low, high = region.low[dim:], region.high[dim:]
         if mode == 1 or len(region.goals) == 0:
             return self._rng.uniform(low, high)
-        # Ties are common, as competence is -1 far from all outcomes. Without a draw one goal would be repeated forever.
+        # Ties are common, as competence is -1, its least, far from all outcomes. Without a draw one goal would recur.
         worst = self._rng.choice(np.flatnonzero(region.competences == region.competences.min()))
         step = self._near * (high - low)
         return Box(low, high).clip(region.goals[worst] + self._rng.uniform(-step, step))

@@ -19,16 +19,18 @@ from sgimd_torch.goals.uniform import UniformGoals
 from sgimd_torch.parts import Problem
 from sgimd_torch.spaces import Array
 
-_FIRST: Final = 21  # least number of exemplars that determine a box; with fewer, goals are uniform in T
+_FEWEST: Final = 21  # least number of exemplars that determine a box; with fewer, goals are uniform in T
 _SAMPLED: Final = 1000  # largest number of exemplars from which the box is computed
 _GROWTH: Final = 1.05  # factor by which the memory grows from one box to the next
-_SIMILAR: Final = 5  # number of similar movements whose mean outcome counts; fewer while the memory is small
+_SIMILAR: Final = 5  # largest number of similar movements whose mean outcome counts
+_PER_SIMILAR: Final = 21  # number of exemplars in memory for each of these similar movements
 _TAIL: Final = 0.02  # share of the mean outcomes that is left out at each end of a dimension
 _NARROWEST: Final = 0.02  # least width of the step, relative to the box's longest side
-_WIDEST: Final = 0.2  # greatest width of the step after the first exemplars
+_WIDEST: Final = 0.2  # greatest width of the step after the first exemplars, relative to the box's longest side
+_EARLY: Final = 21  # least width of the step, relative to that side, times the number of exemplars
 _WIDE_FOR: Final = 250  # number of exemplars up to which the step stays wide
-_FACTOR: Final = 1.4  # factor of the step after a met goal outside the box; 1.4^(-1/3) after a missed one
-_MEDIAN_FACTOR: Final = 1.1  # factor of the running median after a larger error; after a smaller one 1 / 1.1
+_STEP_FACTOR: Final = 1.4  # factor of the step after a met goal outside the box; 1.4^(-1/3) after a missed one
+_MEDIAN_FACTOR: Final = 1.1  # factor of the running median error after a larger error; 1 / 1.1 after a smaller one
 _ROUNDING: Final = 1e-9  # largest spread of outcomes that counts as none, relative to the longest side of T
 _ALL_OF_T: Final = 0.7  # geometric mean of the box's sides, relative to T's, from which on goals are uniform in T
 
@@ -62,7 +64,7 @@ class WithinReach(UniformGoals):
         """
         goal, space = super().sample(context), self.problem.outcomes
         n = len(self.problem.memory)
-        if n >= max(_FIRST, _GROWTH * self._n_updated):
+        if n >= max(_FEWEST, _GROWTH * self._n_updated):
             self._update_box()
         if self._box is None or self._all_of_t or self.problem.inverse.effects() is not None:
             return goal
@@ -89,7 +91,7 @@ class WithinReach(UniformGoals):
             self._median_error = median * _MEDIAN_FACTOR if error > median else median / _MEDIAN_FACTOR
         elif len(self.problem.memory) >= _WIDE_FOR:
             is_met = error < max(beyond, self._median_error)
-            step = self._step * _FACTOR if is_met else self._step / _FACTOR ** (1 / 3)
+            step = self._step * _STEP_FACTOR if is_met else self._step / _STEP_FACTOR ** (1 / 3)
             self._step = min(max(step, _NARROWEST), _WIDEST)
 
     def _update_box(self) -> None:
@@ -97,7 +99,7 @@ class WithinReach(UniformGoals):
         memory, space = self.problem.memory, self.problem.outcomes
         n = self._n_updated = len(memory)
         rows = np.arange(0, n, 1 + n // _SAMPLED)
-        similar = memory.neighbourhoods(rows, min(_SIMILAR, n // _FIRST))
+        similar = memory.neighbourhoods(rows, min(_SIMILAR, n // _PER_SIMILAR))
         means = memory.outcomes[similar].mean(axis=1)
         box = np.quantile(means, (_TAIL, 1 - _TAIL), axis=0)
         if np.ptp(box, axis=0).max() > _ROUNDING * space.sides.max():
@@ -110,5 +112,5 @@ class WithinReach(UniformGoals):
     def _around(self, box: Array, step: float) -> tuple[Array, Array]:
         """Low and high corners of the box that is widened by the step, within T."""
         low, high = box
-        beyond = max(step, _FIRST / self._n_updated) * float((high - low).max())
+        beyond = max(step, _EARLY / self._n_updated) * float((high - low).max())
         return self.problem.outcomes.clip(low - beyond), self.problem.outcomes.clip(high + beyond)

@@ -29,16 +29,16 @@ class AmongEffects(Inverse):
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)
         self._effects = Effects(problem.memory, problem.outcome_noise)
-        self.of_all = self._among = LocalProcess(problem)
+        self.of_all = self._of_effective = LocalProcess(problem)
 
     def __call__(self, context: Array, goal: Array) -> Estimate:
         """The answer, and the exemplars of the nearest outcomes, nearest first."""
-        acted = self.effects()
-        if acted is None or not len(acted):
+        effective = self.effects()
+        if effective is None or not len(effective):
             return self.of_all(context, goal)
-        if self._among.memory is not acted:
-            self._among = LocalProcess(self.problem.over(acted))
-        return self._among(context, goal)
+        if self._of_effective.memory is not effective:
+            self._of_effective = LocalProcess(self.problem.over(effective))
+        return self._of_effective(context, goal)
 
     def predict(self, context: Array, theta: Array) -> Array | None:
         """Prediction of `LocalProcess`, fitted to all movements."""

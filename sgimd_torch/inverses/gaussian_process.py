@@ -22,10 +22,10 @@ from sgimd_torch.memory.compiled import compiled
 from sgimd_torch.spaces import Array
 
 _BLAS: Final = ThreadpoolController()
-_LEAST: Final = 1e-6  # least noise variance, relative to the kernel's; with less noise the matrix would be singular
-_NOISES: Final = (_LEAST, 1e-4, 1e-3, 1e-2, 0.03, 0.1, 0.3, 1.0, 3.0)
-_SCALES: Final = (0.5, 1.0, 2.0)
-_ROUGH: Final = ((1.0, 0.0), *itertools.product((4.0, 12.0), (0.03, 0.1, 0.3, 0.6)))  # (finer, share)
+_LEAST_NOISE: Final = 1e-6  # least noise variance, relative to the kernel's; with less the matrix would be singular
+_NOISES: Final = (_LEAST_NOISE, 1e-4, 1e-3, 1e-2, 0.03, 0.1, 0.3, 1.0, 3.0)  # of the grid of kernels
+_SCALES: Final = (0.5, 1.0, 2.0)  # of the grid of kernels
+_ROUGH: Final = ((1.0, 0.0), *itertools.product((4.0, 12.0), (0.03, 0.1, 0.3, 0.6)))  # (finer, share) of the grid
 _SMOOTH: Final = np.array([1.0, 1.0, 0.0, 0.0])  # a `Kernel` without rough part
 _STEPS: Final = 30  # largest number of steps of the fit of lengths
 
@@ -65,27 +65,27 @@ def fit_lengths(inputs: Array, outcomes: Array) -> Array:
     deviations = outcomes - outcomes.mean(axis=0)
     deviations = deviations / deviations.std()
     guess = np.log(1.5 * np.sqrt(dim))
-    columns, kernels = np.ascontiguousarray(inputs.T), compiled("sgimd_torch.inverses.kernels")
+    transposed, kernels = np.ascontiguousarray(inputs.T), compiled("sgimd_torch.inverses.kernels")
 
     def loss(parameters: Array) -> tuple[float, Array]:
-        scaled, noise = columns * np.exp(-parameters[:dim, None]), float(np.exp(parameters[dim]))
-        covariance, slopes = kernels.correlations(scaled, _SMOOTH)
+        scaled, noise = transposed * np.exp(-parameters[:dim, None]), float(np.exp(parameters[dim]))
+        covariance, slopes = kernels.covariance_matrix(scaled, _SMOOTH)
         covariance.flat[:: len(inputs) + 1] += noise
         # The lower half of an array of C is the upper half of an array of Fortran.
         factor, failed = dpotrf(covariance.T, lower=False, overwrite_a=True)
         if failed:
             raise np.linalg.LinAlgError("the covariance is not positive definite")
-        logs = np.log(np.diag(factor)).sum()
+        half_log_determinant = np.log(np.diag(factor)).sum()
         weights, _ = dpotrs(factor, deviations, lower=False)
         inverse, _ = dpotri(factor, lower=False, overwrite_c=True)
         variance = (deviations * weights).mean()
         by_lengths, by_noise = kernels.gradient(scaled, inverse.T, np.ascontiguousarray(weights.T), slopes, variance)
         deviation = (parameters[:dim] - guess) / 1.5
-        likelihood = 0.5 * deviations.size * np.log(variance) + deviations.shape[1] * logs
+        likelihood = 0.5 * deviations.size * np.log(variance) + deviations.shape[1] * half_log_determinant
         value = float(likelihood + 0.5 * (deviation * deviation).sum())
         return value, np.append(by_lengths + deviation / 1.5, noise * by_noise)
 
-    bounds = [(guess - 5, guess + np.log(2))] * dim + [(np.log(_LEAST), np.log(3))]
+    bounds = [(guess - 5, guess + np.log(2))] * dim + [(np.log(_LEAST_NOISE), np.log(3))]
     start = np.append(np.full(dim, guess), np.log(0.05))
     fit = minimize(loss, start, jac=True, method="L-BFGS-B", bounds=bounds, options={"maxiter": _STEPS})
     return np.exp(fit.x[:dim])
@@ -99,19 +99,19 @@ def choose_kernel(groups: Sequence[tuple[Array, Array]], noise: float) -> Kernel
         noise: standard deviation of each outcome dimension, as the environment states it. Near some movements it may be
             twice or half as large, so other values are less likely, but possible. With 0 there is no noise.
     """
-    noises = np.array(_NOISES if noise > 0 else [_LEAST])
+    noises = np.array(_NOISES if noise > 0 else [_LEAST_NOISE])
     grid = np.array([(scale, *rough, 0.0) for scale, rough in itertools.product(_SCALES, _ROUGH)])
     scores = np.zeros((len(grid), len(noises)))
     kernels = compiled("sgimd_torch.inverses.kernels")
     for inputs, outcomes in groups:
         deviations, inputs = outcomes - outcomes.mean(axis=0), np.ascontiguousarray(inputs.T)
         for row, kernel in zip(scores, grid, strict=True):
-            covariance, _ = kernels.correlations(inputs, kernel)
-            # Tridiagonal once, so that each noise is cheap: turned by reflections of all movements but the first.
-            below, diagonal, beside, lengths, _ = dsytrd(covariance, lower=True)
-            others, _, _ = dormqr("L", "T", below[1:, :-1], lengths, deviations[1:], 64 * deviations.shape[1])
-            turned = np.concatenate((deviations[:1], others)).T.copy()
-            row += kernels.scores(diagonal, beside, turned, noises, float(noise))
-    kernel, best_noise = np.unravel_index(scores.argmax(), scores.shape)
-    scale, finer, share, _ = grid[kernel].tolist()
+            covariance, _ = kernels.covariance_matrix(inputs, kernel)
+            # Tridiagonal once, so that each noise is cheap: by reflections of all movements but the first.
+            reflections, diagonal, beside_diagonal, factors, _ = dsytrd(covariance, lower=True)
+            others, _, _ = dormqr("L", "T", reflections[1:, :-1], factors, deviations[1:], 64 * deviations.shape[1])
+            reflected = np.concatenate((deviations[:1], others)).T.copy()
+            row += kernels.scores(diagonal, beside_diagonal, reflected, noises, float(noise))
+    best_row, best_noise = np.unravel_index(scores.argmax(), scores.shape)
+    scale, finer, share, _ = grid[best_row].tolist()
     return Kernel(scale, finer, share, float(noises[best_noise]))

@@ -11,18 +11,20 @@ import math
 from typing import Final, NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import float64, njit
 
-from sgimd_torch.memory.jit import LISTS, NUMBER, NUMBERS, ROWS, TABLE, columns, compiled_for, inner, squared_distance
+from sgimd_torch.memory.jit import LISTS, NUMBERS, ROWS, TABLE, as_columns, compiled_for, jit_helper, squared_distance
 from sgimd_torch.spaces import Array
 
-STEPS, STARTS = 4, 3  # number of Gauss-Newton steps from each start, and of exemplars where steps begin
-DAMPINGS: Final = (1e-3, 0.1, 1.0, 10.0)
+STEPS: Final = 4  # largest number of Gauss-Newton steps from each start
+STARTS: Final = 3  # number of exemplars where steps begin
+DAMPINGS: Final = (1e-3, 0.1, 1.0, 10.0)  # all tried in each step, relative to the mean diagonal of J J^T
 CLEARLY: Final = 0.8  # error, relative to that of the nearest exemplar, below which a candidate is clearly better
-TINY: Final = 1e-300
+TINY: Final = 1e-300  # guard against 0 where a number is divided or its logarithm is taken
 ROOT5: Final = float(np.sqrt(5))
 LOG2: Final = math.log(2)
-LOG2_HIGH, LOG2_LOW = 0.693147180369123816, 1.90821492927058770e-10  # sum to log 2; n times the first is exact
+LOG2_HIGH: Final = 0.693147180369123816  # first digits of log 2, so few that n times this number is exact
+LOG2_LOW: Final = 1.90821492927058770e-10  # log 2 - LOG2_HIGH
 TERMS: Final = tuple(1 / math.factorial(k) for k in range(13, 0, -1))  # of the series of e^r, all but 1
 
 
@@ -30,8 +32,9 @@ class GaussianProcess(NamedTuple):
     """Gaussian process, given some movements.
 
     Attributes:
-        inputs: ``(dim, n)``, theta and context of each movement, in lengths.
-        kernel: ``(4,)``, scale, finer, share and noise of a `gaussian_process.Kernel`.
+        inputs: ``(dim, n)``, theta and context of each movement, in lengths: each divided by its length scale.
+        kernel: ``(4,)``: scale, which multiplies all inputs; finer, how much shorter the length of a second Matern is;
+            share, weight of the second Matern; noise, variance relative to the kernel's.
         factor: ``(n, n)`` Cholesky factor of the covariance of the movements.
         weights: ``(outcome_dim, n)``, inverse covariance times outcomes.
         mean: ``(outcome_dim,)``, mean outcome.
@@ -48,8 +51,8 @@ class GaussianProcess(NamedTuple):
 
 @njit(nogil=True)
 def exponential(x: float) -> float:
-    """e^x = 2^n e^r for x <= 0. Numba computes several at once, so each takes a quarter of the time of `np.exp`, and an
-    answer four fifths."""
+    """e^x = 2^n e^r for x <= 0. Numba computes several at once, four times faster than `np.exp`, which saves a fifth of
+    the time of an answer. Sums must not be reordered, or r would lose digits; so it is no `jit_helper`."""
     x = max(x, -700.0)
     n = np.rint(x / LOG2)
     r = x - n * LOG2_HIGH - n * LOG2_LOW
@@ -59,17 +62,17 @@ def exponential(x: float) -> float:
     return (1 + series) * np.int64((np.int64(n) + 1023) << 52).view(np.float64)
 
 
-@inner
+@jit_helper
 def matern(distance: float) -> tuple[float, float]:
     """Matern 5/2 kernel, and its derivative divided by the distance."""
     decay = exponential(-ROOT5 * distance)
     return (1 + ROOT5 * distance + 5 / 3 * distance**2) * decay, -5 / 3 * (1 + ROOT5 * distance) * decay
 
 
-@inner
+@jit_helper
 def covariances(inputs: Array, kernel: Array, point: Array, covariance: Array, slope: Array) -> None:
     """Write the covariances of ``point`` ``(dim,)`` with the first ``len(covariance)`` of ``inputs`` ``(dim, n)``, and
-    their derivatives by the point, divided by the difference of the inputs."""
+    slopes: the derivative of covariance j by the point is slope_j (point - input_j)."""
     scale, finer, share, n = kernel[0], kernel[1], kernel[2], len(covariance)
     covariance[:] = 0
     for k in range(len(point)):
@@ -86,7 +89,7 @@ def covariances(inputs: Array, kernel: Array, point: Array, covariance: Array, s
 
 
 @compiled_for(TABLE, NUMBERS)
-def correlations(inputs: Array, kernel: Array) -> tuple[Array, Array]:
+def covariance_matrix(inputs: Array, kernel: Array) -> tuple[Array, Array]:
     """Covariance matrix ``(n, n)`` of ``inputs`` ``(dim, n)``, without noise, and its slopes, see `covariances`; the
     lower halves alone."""
     n = inputs.shape[1]
@@ -96,7 +99,7 @@ def correlations(inputs: Array, kernel: Array) -> tuple[Array, Array]:
     return covariance, slopes
 
 
-@inner
+@jit_helper
 def solve_lower(lower: Array, b: Array) -> None:
     """``b`` ``(n,)`` becomes ``lower``^-1 b."""
     for i in range(len(b)):
@@ -106,7 +109,7 @@ def solve_lower(lower: Array, b: Array) -> None:
         b[i] = (b[i] - total) / lower[i, i]
 
 
-@inner
+@jit_helper
 def solve_transposed(lower: Array, b: Array) -> None:
     """``b`` ``(n,)`` becomes ``lower``^-T b."""
     for i in range(len(b) - 1, -1, -1):
@@ -115,11 +118,11 @@ def solve_transposed(lower: Array, b: Array) -> None:
             b[k] -= lower[i, k] * b[i]
 
 
-@inner
+@jit_helper
 def fitted_process(inputs: Array, outcomes: Array, kernel: Array) -> GaussianProcess:
     """The process of movements with ``inputs`` ``(dim, n)`` and ``outcomes`` ``(outcome_dim, n)``."""
     m, n = outcomes.shape
-    covariance, _ = correlations(inputs, kernel)
+    covariance, _ = covariance_matrix(inputs, kernel)
     for i in range(n):
         covariance[i, i] += kernel[3]
     factor = np.ascontiguousarray(np.linalg.cholesky(covariance))
@@ -133,109 +136,110 @@ def fitted_process(inputs: Array, outcomes: Array, kernel: Array) -> GaussianPro
     return GaussianProcess(inputs, kernel, factor, weights, mean, max(total / (n * m), TINY))
 
 
-@inner
-def precisions(factor: Array, last: int) -> Array:
-    """Diagonal of the inverse covariance for the ``last`` movements, which need the last corner of the factor alone."""
-    first = len(factor) - last
-    root, diagonal = np.linalg.inv(factor[first:, first:].copy()), np.zeros(last)
-    for j in range(last):
-        for i in range(j, last):
+@jit_helper
+def precisions(factor: Array, n_last: int) -> Array:
+    """Diagonal of the inverse covariance for the last movements; only the last corner of the factor is needed."""
+    first = len(factor) - n_last
+    root, diagonal = np.linalg.inv(factor[first:, first:].copy()), np.zeros(n_last)
+    for j in range(n_last):
+        for i in range(j, n_last):
             diagonal[j] += root[i, j] ** 2
     return diagonal
 
 
-@inner
-def unknown(process: GaussianProcess, covariance: Array) -> float:
+@jit_helper
+def variance_at(process: GaussianProcess, covariance: Array) -> float:
     """Variance of the outcome of a point that has this ``covariance`` with the inputs, without noise."""
     known = covariance.copy()
     solve_lower(process.factor, known)
     return process.variance * max(1 - float(known @ known), 0.0)
 
 
-@inner
+@jit_helper
 def expected(process: GaussianProcess, covariance: Array) -> Array:
     """Expected outcome of a point that has this ``covariance`` with the inputs."""
     return process.weights @ covariance + process.mean
 
 
-@inner
+@jit_helper
 def prediction(process: GaussianProcess, point: Array) -> tuple[Array, float]:
     """Expected outcome of a movement with the input ``point`` ``(dim,)``, and its variance, without noise."""
     covariance, slope = np.empty(process.inputs.shape[1]), np.empty(process.inputs.shape[1])
     covariances(process.inputs, process.kernel, point, covariance, slope)
-    return expected(process, covariance), unknown(process, covariance)
+    return expected(process, covariance), variance_at(process, covariance)
 
 
-@inner
+@jit_helper
 def expected_error(process: GaussianProcess, goal: Array, inflation: float, covariance: Array, limit: float) -> float:
-    """Expected squared error, the variance times ``inflation`` included; any number above ``limit`` if it is larger."""
+    """Expected squared error, the variance times ``inflation`` included. A result of ``limit`` or more
+    is not exact: the error is at least ``limit``, too."""
     error = squared_distance(expected(process, covariance), goal)
-    return error if error >= limit else error + inflation * unknown(process, covariance)
+    return error if error >= limit else error + inflation * variance_at(process, covariance)
 
 
-@inner
-def in_lengths(theta: Array, context: Array, units: Array) -> Array:
-    """Input ``(dim,)`` of the process; ``units``: ``(2, dim)``, origin and size of a length."""
-    point, t = np.empty(units.shape[1]), len(theta)
+@jit_helper
+def in_lengths(theta: Array, context: Array, scaling: Array) -> Array:
+    """Input ``(dim,)`` of the process; ``scaling`` ``(2, dim)``: origin and length scale of each."""
+    point, t = np.empty(scaling.shape[1]), len(theta)
     for k in range(len(point)):
-        point[k] = ((theta[k] if k < t else context[k - t]) - units[0, k]) / units[1, k]
+        point[k] = ((theta[k] if k < t else context[k - t]) - scaling[0, k]) / scaling[1, k]
     return point
 
 
-@inner
+@jit_helper
 def descend(
     process: GaussianProcess,
     start: Array,
     context: Array,
     goal: Array,
     inflation: float,
-    units: Array,
+    scaling: Array,
     spreads: Array,
     box: Array,
 ) -> tuple[float, Array]:
     """Least expected squared error, and its theta, after damped Gauss-Newton steps from ``start`` ``(theta_dim,)``.
-    Steps end when they do not help; each is as short as possible, so unimportant parameters hardly change."""
+    Steps end when they do not help; they have the least norm, so unimportant parameters hardly change."""
     n, t, m = process.inputs.shape[1], len(start), len(goal)
     least, best = np.inf, start
     covariance, slope = np.empty((1 + len(DAMPINGS), n)), np.empty((1 + len(DAMPINGS), n))
     tried, jacobian = np.empty((len(DAMPINGS), t)), np.empty((m, t))
-    covariances(process.inputs, process.kernel, in_lengths(best, context, units), covariance[0], slope[0])
+    covariances(process.inputs, process.kernel, in_lengths(best, context, scaling), covariance[0], slope[0])
     for _ in range(STEPS):
-        point = in_lengths(best, context, units)
+        point = in_lengths(best, context, scaling)
         for k in range(m):
-            pull = process.weights[k] * slope[0]
-            back = process.inputs @ pull
+            weighted_slopes = process.weights[k] * slope[0]
+            weighted_inputs = process.inputs @ weighted_slopes
             for i in range(t):
-                jacobian[k, i] = (point[i] * pull.sum() - back[i]) * spreads[i] / units[1, i]
-        ahead, squares = goal - expected(process, covariance[0]), jacobian @ jacobian.T
-        size, better = np.trace(squares) / m + TINY, 0
+                jacobian[k, i] = (point[i] * weighted_slopes.sum() - weighted_inputs[i]) * spreads[i] / scaling[1, i]
+        residual, gram = goal - expected(process, covariance[0]), jacobian @ jacobian.T
+        mean_gram, best_try = np.trace(gram) / m + TINY, 0  # best_try 0: no try is better
         for d in range(len(DAMPINGS)):
-            step = np.linalg.solve(squares + size * DAMPINGS[d] * np.eye(m), ahead) @ jacobian
+            step = np.linalg.solve(gram + mean_gram * DAMPINGS[d] * np.eye(m), residual) @ jacobian
             for i in range(t):
                 tried[d, i] = min(max(best[i] + spreads[i] * step[i], box[0, i]), box[1, i])
-            point = in_lengths(tried[d], context, units)
+            point = in_lengths(tried[d], context, scaling)
             covariances(process.inputs, process.kernel, point, covariance[1 + d], slope[1 + d])
             error = expected_error(process, goal, inflation, covariance[1 + d], least)
             if error < least:
-                least, better = error, 1 + d
-        if not better:
+                least, best_try = error, 1 + d
+        if not best_try:
             break
-        best, covariance[0], slope[0] = tried[better - 1].copy(), covariance[better], slope[better]
+        best, covariance[0], slope[0] = tried[best_try - 1].copy(), covariance[best_try], slope[best_try]
     return least, best
 
 
-@inner
+@jit_helper
 def rows_to_fit(near: np.ndarray, alike: np.ndarray, n: int) -> np.ndarray:
-    """Rows that a process is fitted to: those of ``alike``, which are nearest first in each list, by turns, and at the
-    end those ``near`` the goal."""
-    rows, new = np.empty(alike.shape[1], np.int64), np.ones(n, np.bool_)
+    """Rows ``(k,)`` that a process is fitted to: those of the lists ``alike`` ``(lists, k)``, nearest first in each, by
+    turns, and at the end those ``near`` the goal. No list has a -1; ``n`` is the number of movements in memory."""
+    rows, unused = np.empty(alike.shape[1], np.int64), np.ones(n, np.bool_)
     for j in range(len(near)):  # a slice would compile for 2 s
-        rows[len(rows) - len(near) + j], new[near[j]] = near[j], False
+        rows[len(rows) - len(near) + j], unused[near[j]] = near[j], False
     count = 0
     for i in range(alike.shape[1]):
         for row in alike[:, i]:
-            if new[row] and count < len(rows) - len(near):
-                rows[count], new[row] = row, False
+            if unused[row] and count < len(rows) - len(near):
+                rows[count], unused[row] = row, False
                 count += 1
     return rows
 
@@ -251,28 +255,28 @@ def answer(
     goal: Array,
     kernel: Array,
     linear: Array,
-    units: Array,
+    scaling: Array,
     spreads: Array,
     box: Array,
 ) -> tuple[Array, Array, float]:
-    """theta of the candidate with the least expected squared error; that of the nearest exemplar, unless another one is
-    clearly better. Also its expected outcome, and the standard deviation from that, noise included.
+    """theta of the candidate with the least expected squared error, or of the nearest exemplar if none is a fifth
+    better. Also its expected outcome, and the standard deviation from that, noise included.
 
     Args:
-        near: ``(k,)`` rows of the nearest outcomes, nearest first.
-        alike: ``(m, n)`` rows of the movements most like the first of these.
-        inputs: ``(n, dim)``, all movements in lengths.
+        near: ``(n_near,)`` rows of the nearest outcomes, nearest first.
+        alike: ``(lists, k)`` rows of the movements most like the first of these, one list for each; k > n_near.
+        inputs: ``(n, dim)``, all movements in memory, in lengths.
         thetas, outcomes: ``(n, theta_dim)`` and ``(n, outcome_dim)``, all movements in memory.
         context, goal: question.
         kernel: ``(4,)``, see `GaussianProcess`.
         linear: ``(theta_dim,)``, answer of `LocallyLinear`.
-        units: ``(2, dim)``, see `in_lengths`.
-        spreads: ``(theta_dim,)``, unit of the steps.
+        scaling: ``(2, dim)``, see `in_lengths`.
+        spreads: ``(theta_dim,)``, standard deviation of each parameter in memory, the unit of the steps.
         box: ``(2, theta_dim)``, corners of the box around all thetas.
     """
     rows, m, noise = rows_to_fit(near, alike, len(thetas)), len(goal), kernel[3]
     first = len(rows) - len(near)
-    process = fitted_process(columns(inputs, rows), columns(outcomes, rows), kernel)
+    process = fitted_process(as_columns(inputs, rows), as_columns(outcomes, rows), kernel)
     precision = precisions(process.factor, len(near))
     # The mean squared error of predicting each exemplar from all others, divided by the expected one.
     surprise = 0.0
@@ -280,73 +284,77 @@ def answer(
         for k in range(m):
             surprise += process.weights[k, first + j] ** 2 / precision[j] / (len(near) * m * process.variance)
     # Two corrections inflate the variance: one for surprising exemplars here, and one because a process with many
-    # lengths, fitted to few movements, errs most at the candidates that look best.
-    inflation = m * max(1.0, surprise) * (1 + units.shape[1] ** 2 / len(thetas))
+    # lengths, fitted while the memory is small, errs most at the candidates that look best.
+    inflation = m * max(1.0, surprise) * (1 + scaling.shape[1] ** 2 / len(thetas))
     covariance, slope = np.empty(len(rows)), np.empty(len(rows))
-    least, nearest, best = np.inf, np.inf, linear
+    least, nearest_error, best = np.inf, np.inf, linear
     for j in range(len(near)):
         if len(context):
-            covariances(process.inputs, kernel, in_lengths(thetas[near[j]], context, units), covariance, slope)
+            covariances(process.inputs, kernel, in_lengths(thetas[near[j]], context, scaling), covariance, slope)
             error = expected_error(process, goal, inflation, covariance, least)
-        else:  # its outcome without its noise, and the variance of that
+        else:  # posterior of its outcome without noise, given itself and all others
             error = inflation * process.variance * noise * max(1 - noise * precision[j], 0.0)
             for k in range(m):
                 error += (outcomes[near[j], k] - noise * process.weights[k, first + j] - goal[k]) ** 2
         if j == 0:
-            nearest = error
+            nearest_error = error
         if error < least:
             least, best = error, thetas[near[j]]
-    covariances(process.inputs, kernel, in_lengths(linear, context, units), covariance, slope)
+    covariances(process.inputs, kernel, in_lengths(linear, context, scaling), covariance, slope)
     error = expected_error(process, goal, inflation, covariance, least)
     if error < least:
         least, best = error, linear
     for row in near[:STARTS]:
-        error, theta = descend(process, thetas[row], context, goal, inflation, units, spreads, box)
+        error, theta = descend(process, thetas[row], context, goal, inflation, scaling, spreads, box)
         if error < least:
             least, best = error, theta
-    best = best.copy() if least < CLEARLY * nearest else thetas[near[0]].copy()
-    outcome, variance = prediction(process, in_lengths(best, context, units))
+    best = best.copy() if least < CLEARLY * nearest_error else thetas[near[0]].copy()
+    outcome, variance = prediction(process, in_lengths(best, context, scaling))
     return best, outcome, np.sqrt(max(1.0, surprise) * (variance + process.variance * noise))
 
 
 @compiled_for(TABLE, TABLE, ROWS, NUMBERS, NUMBERS)
-def foretell(inputs: Array, outcomes: Array, rows: np.ndarray, point: Array, kernel: Array) -> tuple[Array, float]:
+def fit_and_predict(
+    inputs: Array, outcomes: Array, rows: np.ndarray, point: Array, kernel: Array
+) -> tuple[Array, float]:
     """Expected outcome of a movement, and its variance, by the process of the movements in ``rows``."""
-    return prediction(fitted_process(columns(inputs, rows), columns(outcomes, rows), kernel), point.copy())
+    process = fitted_process(as_columns(inputs, rows), as_columns(outcomes, rows), kernel)
+    return prediction(process, point.copy())
 
 
-@compiled_for(NUMBERS, NUMBERS, TABLE, NUMBERS, NUMBER)
+@compiled_for(NUMBERS, NUMBERS, TABLE, NUMBERS, float64)
 def scores(diagonal: Array, beside: Array, outcomes: Array, noises: Array, stated: float) -> Array:
     """Log likelihoods ``(noises,)`` of movements with each noise, see `choose_kernel`.
 
     Args:
-        diagonal, beside: ``(n,)`` and ``(n - 1,)``, covariance matrix without noise, turned so that it is tridiagonal.
-        outcomes: ``(outcome_dim, n)``, of mean 0, turned likewise.
+        diagonal, beside: ``(n,)`` and ``(n - 1,)``, covariance matrix without noise, after reflections of the
+            movements that make it tridiagonal.
+        outcomes: ``(outcome_dim, n)``, of mean 0, reflected likewise.
         noises: ``(noises,)``, variances relative to the kernel's.
         stated: standard deviation of the noise, as the environment states it.
     """
     m, n = outcomes.shape
     likelihoods = np.empty(len(noises))
     for a in range(len(noises)):
-        white, pivot = outcomes[:, 0].copy(), diagonal[0] + noises[a]
-        total, logs = white @ white / pivot, np.log(pivot)
+        eliminated, pivot = outcomes[:, 0].copy(), diagonal[0] + noises[a]
+        total, logs = eliminated @ eliminated / pivot, np.log(pivot)
         for i in range(1, n):
             ratio = beside[i - 1] / pivot
             pivot = diagonal[i] + noises[a] - ratio * beside[i - 1]
             logs += np.log(pivot)
             for k in range(m):
-                white[k] = outcomes[k, i] - ratio * white[k]
-                total += white[k] ** 2 / pivot
+                eliminated[k] = outcomes[k, i] - ratio * eliminated[k]
+                total += eliminated[k] ** 2 / pivot
         variance = max(total / (n * m), TINY)
         likelihoods[a] = -0.5 * m * (n * np.log(variance) + logs)
-        if stated > 0:
+        if stated > 0:  # prior: the log variance has a standard deviation of 1/2 if m = 1 and n = 60
             likelihoods[a] -= 2 * m * np.log(noises[a] * variance / stated**2) ** 2 * n / 60
     return likelihoods
 
 
-@compiled_for(TABLE, TABLE, TABLE, TABLE, NUMBER)
+@compiled_for(TABLE, TABLE, TABLE, TABLE, float64)
 def gradient(inputs: Array, inverse: Array, weights: Array, slopes: Array, variance: float) -> tuple[Array, float]:
-    """Derivatives of half the deviance (5.9 in Rasmussen & Williams) by log lengths ``(dim,)``, and by the noise.
+    """Derivatives of -log likelihood (5.9 in Rasmussen & Williams) by log lengths ``(dim,)``, and by the noise.
 
     Args:
         inputs: ``(dim, n)``, in lengths.
@@ -356,17 +364,17 @@ def gradient(inputs: Array, inverse: Array, weights: Array, slopes: Array, varia
         variance: most likely variance.
     """
     n, m = len(inverse), len(weights)
-    by_lengths, by_noise, by_square = np.zeros(len(inputs)), 0.0, np.empty(n)
+    by_lengths, by_noise, by_covariance = np.zeros(len(inputs)), 0.0, np.empty(n)
     for i in range(n):
         for j in range(i + 1):
-            by_square[j] = m * inverse[i, j]
+            by_covariance[j] = m * inverse[i, j]
         for k in range(m):
             for j in range(i + 1):
-                by_square[j] -= weights[k, i] * weights[k, j] / variance
-        by_noise += by_square[i] / 2
+                by_covariance[j] -= weights[k, i] * weights[k, j] / variance
+        by_noise += by_covariance[i] / 2
         for j in range(i):
-            by_square[j] *= slopes[i, j]
+            by_covariance[j] *= slopes[i, j]
         for k in range(len(inputs)):
             for j in range(i):
-                by_lengths[k] -= by_square[j] * (inputs[k, i] - inputs[k, j]) ** 2
+                by_lengths[k] -= by_covariance[j] * (inputs[k, i] - inputs[k, j]) ** 2
     return by_lengths, by_noise

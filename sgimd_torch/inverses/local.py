@@ -1,7 +1,8 @@
 """Local inverse model L^-1: mean of similar movements whose outcomes are near the goal.
 
 Section 4.4.2 and eqs. (8) and (9) of Nguyen & Oudeyer (2014). Different movements can reach the same place, but their
-mean may land elsewhere. So the mean is over one neighbourhood in Pi, whose outcomes are near the goal and vary little.
+mean may land elsewhere. So the mean is over one neighbourhood in Pi, the space of thetas, whose outcomes are near the
+goal and vary little.
     inverse = LocalInverse(problem); estimate = inverse(context, goal); estimate.theta
 """
 
@@ -22,8 +23,10 @@ class LocalInverse(Inverse):
         problem: problem to learn.
         h_max: number of exemplars, those nearest to the goal, whose neighbourhoods are compared, eq. (8).
         k_max: largest number of exemplars in a neighbourhood.
-        dist_n: radius of a neighbourhood in Pi, the paper's distN; None: 0.6 sqrt(theta_dim / 25).
+        dist_n: radius of a neighbourhood in Pi, the paper's distN; None: the paper's .6 in its 25
+            dimensions, and 0.6 sqrt(theta_dim / 25) in others, because distances grow with sqrt(theta_dim).
         alpha: weight of the standard deviation of outcomes in a neighbourhood; their distance to the goal has weight 1.
+        variance: true: the variance takes the place of the standard deviation, as the paper prints it.
         width: width of the Gaussian of eq. (9), relative to the mean distance of the neighbourhood's outcomes from the
             goal. A wide Gaussian averages the neighbourhood; a narrow one follows the exemplar nearest to the goal.
 
@@ -31,7 +34,7 @@ class LocalInverse(Inverse):
         ValueError: ``width`` is not positive.
     """
 
-    says_how_sure = False
+    says_how_sure = False  # estimates have no expected outcome and no error
 
     def __init__(
         self,
@@ -41,13 +44,14 @@ class LocalInverse(Inverse):
         k_max: int = 10,
         dist_n: float | None = None,
         alpha: float = 0.5,
+        variance: bool = False,
         width: float = 0.25,
     ) -> None:
         if not width > 0:
             raise ValueError(f"width must be positive, got {width}; it is relative to the mean distance to the goal")
         super().__init__(problem)
         self.memory = problem.memory
-        self.h_max, self.k_max, self.alpha, self.width = h_max, k_max, alpha, width
+        self.h_max, self.k_max, self.alpha, self.variance, self.width = h_max, k_max, alpha, variance, width
         self.dist_n = 0.6 * np.sqrt(problem.policies.dim / 25) if dist_n is None else dist_n
 
     def __call__(self, context: Array, goal: Array) -> Estimate:
@@ -63,10 +67,10 @@ class LocalInverse(Inverse):
         return Estimate(np.clip(theta, thetas.min(axis=0), thetas.max(axis=0)), thetas, outcomes, context)
 
     def _most_reliable(self, context: Array, goal: Array) -> Rows:
-        near = near_goal(self.memory, context, goal, self.h_max)  # H of eq. (8)
-        alike = self.memory.neighbourhoods(near, self.k_max, self.dist_n)
-        neighbourhoods = [rows[rows >= 0] for rows in alike]  # K_h of eq. (8)
-        spreads = _spreads(self.memory.outcomes, neighbourhoods)
+        near = near_goal(self.memory, context, goal, self.h_max)  # H of eq. (8), by distances of context and outcome
+        padded = self.memory.neighbourhoods(near, self.k_max, self.dist_n)  # -1 fills lists with fewer than k_max rows
+        neighbourhoods = [rows[rows >= 0] for rows in padded]  # K_h of eq. (8)
+        spreads = _spreads(self.memory.outcomes, neighbourhoods) ** (2 if self.variance else 1)
         unreliability = distances_to(self.memory.outcomes[near], goal) + self.alpha * spreads
         return neighbourhoods[int(unreliability.argmin())]
 

@@ -27,9 +27,9 @@ _GROWTH: Final = 1.5  # factor of the number of exemplars from fit to fit
 _FITTED: Final = 300  # number of exemplars, drawn from all, to which lengths are fitted
 _GROUPS: Final = 8  # number of groups of neighbours that determine the kernel
 _GROUP: Final = 60  # number of exemplars in each group
-_NEAR: Final = 20  # exemplars with outcomes nearest to the goal, on which the surprise of the process is measured
-_MOST_ALIKE: Final = 100  # exemplars to which the process is fitted, the `_NEAR` ones among them
-_FAR: Final = 1e3  # inputs more spreads from 0 are shifted to 0 first: rounding would hide their differences
+_NEAR: Final = 20  # number of exemplars nearest to the goal, on which the surprise of the process is measured
+_MOST_ALIKE: Final = 100  # number of exemplars to which the process is fitted, the `_NEAR` ones among them
+_FAR: Final = 1e3  # distance from 0, in standard deviations, beyond which inputs are shifted to 0 against rounding
 
 
 class FittedKernel(NamedTuple):
@@ -100,7 +100,7 @@ class LocalProcess(Inverse):
         point = (np.concatenate((theta, context)) - self._units[0]) / self._units[1]
         (rows,) = self._inputs.nearest(point[None], _MOST_ALIKE)
         kernels = compiled("sgimd_torch.inverses.kernels")
-        return kernels.foretell(self._inputs.keys.rows, self.memory.outcomes, rows, point, self._kernel)
+        return kernels.fit_and_predict(self._inputs.keys.rows, self.memory.outcomes, rows, point, self._kernel)
 
     def fitted(self) -> FittedKernel | None:
         """What predictions are made from; None while there are too few exemplars, or all outcomes are equal."""
@@ -109,11 +109,11 @@ class LocalProcess(Inverse):
 
     def _catch_up(self) -> None:
         """Add new exemplars; refit when the memory has grown by half."""
-        n, wanted = len(self.memory), 0
+        n, n_fitted = len(self.memory), 0
         while self._due <= n:
-            wanted, self._due = int(self._due), self._due * _GROWTH
-        if wanted:
-            self._fit(wanted)
+            n_fitted, self._due = int(self._due), self._due * _GROWTH
+        if n_fitted:
+            self._fit(n_fitted)
         if self._kernel is not None and len(self._inputs.keys) < n:
             self._inputs.keys.append(self._scaled(len(self._inputs.keys)))
 
@@ -127,17 +127,17 @@ class LocalProcess(Inverse):
 
     def _fit_to(self, n: int, far: float) -> None:
         self._kernel = None
-        raw = np.concatenate((self.memory.thetas[:n], self.memory.contexts[:n]), axis=1)
+        unscaled = np.concatenate((self.memory.thetas[:n], self.memory.contexts[:n]), axis=1)
         outcomes = self.memory.outcomes[:n]
-        origin = np.where(np.abs(raw[0]) > far * _spreads(raw), raw[0], 0.0)
-        self._spreads = _spreads(raw - origin)
+        origin = np.where(np.abs(unscaled[0]) > far * _spreads(unscaled), unscaled[0], 0.0)
+        self._spreads = _spreads(unscaled - origin)
         if not np.ptp(outcomes, axis=0).any():
             return
         order = stream(n, "fit of a local process").permutation(n)
         drawn = order[:_FITTED]
-        lengths = fit_lengths((raw[drawn] - origin) / self._spreads, outcomes[drawn])
+        lengths = fit_lengths((unscaled[drawn] - origin) / self._spreads, outcomes[drawn])
         self._units = np.stack((origin, self._spreads * lengths))
-        self._inputs = Neighbours(Table(raw.shape[1]))
+        self._inputs = Neighbours(Table(unscaled.shape[1]))
         self._inputs.keys.append(self._scaled(0)[:n])
         inputs = self._inputs.keys.rows
         groups = self._inputs.nearest(inputs[order[:_GROUPS]], _GROUP)
@@ -147,8 +147,8 @@ class LocalProcess(Inverse):
 
     def _scaled(self, first: int) -> Array:
         """Inputs from row ``first`` on, in lengths."""
-        raw = np.concatenate((self.memory.thetas[first:], self.memory.contexts[first:]), axis=1)
-        scaled: Array = (raw - self._units[0]) / self._units[1]
+        unscaled = np.concatenate((self.memory.thetas[first:], self.memory.contexts[first:]), axis=1)
+        scaled: Array = (unscaled - self._units[0]) / self._units[1]
         return scaled
 
 

@@ -32,7 +32,7 @@ class LocallyLinear(Inverse):
         problem: problem to learn.
     """
 
-    says_how_sure = False
+    says_how_sure = False  # estimates have no expected outcome and no error
 
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)

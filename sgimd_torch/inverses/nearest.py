@@ -23,7 +23,7 @@ class NearestNeighbour(Inverse):
         ValueError: ``k`` is not a whole number, or below 1.
     """
 
-    says_how_sure = False
+    says_how_sure = False  # estimates have no expected outcome and no error
 
     def __init__(self, problem: Problem, *, k: int = 10) -> None:
         super().__init__(problem)

@@ -113,7 +113,7 @@ class Learner:
                 row, place = entry
                 context, theta, outcome = memory.contexts[row], memory.thetas[row], memory.outcomes[row]
                 yield Event(Kind.MOVED, context, theta, outcome=outcome, place=place)
-        yield from self._begun([slot for slot, move in self._asked if not isinstance(move, Failure)])
+        yield from self._beginnings([slot for slot, move in self._asked if not isinstance(move, Failure)])
 
     def __reduce__(self) -> NoReturn:
         raise TypeError(
@@ -150,16 +150,16 @@ class Learner:
         if not len(contexts):
             raise ValueError("ask_many() needs a context for each robot, got none")
         dim = self.memory.context_dim
-        seen = [
+        checked = [
             context if isinstance(context, Failure) else check_point("context", context, dim) for context in contexts
         ]
-        for number, context in enumerate(seen):
+        for number, context in enumerate(checked):
             under_way = self.context_at(number)
-            other = under_way is not None and not isinstance(context, Failure) and (context != under_way).any()
-            if other:
+            differs = under_way is not None and not isinstance(context, Failure) and (context != under_way).any()
+            if differs:
                 raise RuntimeError(f"the attempt under way began in context {under_way}, got {context}; see idle")
-        slots = [self._slot(number) for number in range(len(seen))]
-        self._asked = [(slot, self._propose(slot, context)) for slot, context in zip(slots, seen, strict=True)]
+        slots = [self._slot(number) for number in range(len(checked))]
+        self._asked = [(slot, self._propose(slot, context)) for slot, context in zip(slots, checked, strict=True)]
         return [move if isinstance(move, Move) else None for _, move in self._asked]
 
     def request(self, context: ArrayLike, *, place: int = 0) -> Request | None:
@@ -256,7 +256,7 @@ class Learner:
         if self._asked:
             raise RuntimeError("watch() needs the outcome of the last movement first; was tell() forgotten?")
         theta_d = self.translate(demonstration)
-        self._lessons.add(_lesson(demonstration, theta_d))
+        self._lessons.add(_lesson_key(demonstration, theta_d))
         if slot.request is not None:
             asked, who = slot.asked(slot.request, "shown"), slot.request.teacher
             slot.advance(Lesson(theta_d, demonstration))
@@ -310,7 +310,7 @@ class Learner:
             RuntimeError: this learner has no correspondence.
             ValueError: see `watch`.
         """
-        return _lesson(demonstration, self.translate(demonstration)) in self._lessons
+        return _lesson_key(demonstration, self.translate(demonstration)) in self._lessons
 
     def fail(self, reason: str) -> None:
         """Tell the learner that a movement has failed and has no outcome. The movement counts, nothing is
@@ -431,10 +431,10 @@ class Learner:
 
     def _report_new(self, *reported: RobotSlot) -> None:
         """Publish the beginnings of new attempts, unless the next events, of the slots ``reported``, tell them."""
-        begun, self._new = self._begun(reported), []
-        self._publish(*begun)
+        beginnings, self._new = self._beginnings(reported), []
+        self._publish(*beginnings)
 
-    def _begun(self, reported: Sequence[RobotSlot]) -> list[Event]:
+    def _beginnings(self, reported: Sequence[RobotSlot]) -> list[Event]:
         """Events of all new attempts; none if events of the slots ``reported`` tell all of them in their order.
 
         A replay begins attempts in the order of the events, so that each draws the same random numbers again.
@@ -443,5 +443,5 @@ class Learner:
         return [] if in_order else [Event(Kind.ASKED, slot.context, place=slot.number) for slot in self._new]
 
 
-def _lesson(demonstration: Demonstration, theta_d: Array) -> tuple[bytes, bytes]:
+def _lesson_key(demonstration: Demonstration, theta_d: Array) -> tuple[bytes, bytes]:
     return np.asarray(demonstration.context, dtype=np.float64).tobytes(), theta_d.tobytes()

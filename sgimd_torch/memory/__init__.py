@@ -43,8 +43,8 @@ class Memory:
         self.context_dim, self.theta_dim, self.outcome_dim = context_dim, theta_dim, outcome_dim
         self._contexts, self._thetas, self._outcomes = Table(context_dim), Table(theta_dim), Table(outcome_dim)
         # A key is a context followed by an outcome or by a theta; without contexts, outcomes and thetas are the keys.
-        self._outcome_side = Neighbours(Table(context_dim + outcome_dim) if context_dim else self._outcomes)
-        self._policy_side = Neighbours(Table(context_dim + theta_dim) if context_dim else self._thetas)
+        self._by_outcome = Neighbours(Table(context_dim + outcome_dim) if context_dim else self._outcomes)
+        self._by_theta = Neighbours(Table(context_dim + theta_dim) if context_dim else self._thetas)
         self._range = np.stack((np.full(theta_dim, np.inf), np.full(theta_dim, -np.inf)))
 
     def __len__(self) -> int:
@@ -95,7 +95,7 @@ class Memory:
         """Rows ``(min(k, n),)`` whose contexts and outcomes lie nearest to ``context`` and ``goal`` ``(outcome_dim,)``,
         nearest first; of equally near rows, the oldest first."""
         goal = check_point("goal", goal, self.outcome_dim, "was a theta passed instead?")
-        return self._outcome_side.nearest_to(self._key(context, goal), k)
+        return self._by_outcome.nearest_to(self._key(context, goal), k)
 
     def near_policies(self, context: ArrayLike, theta: ArrayLike, k: int, within: float = np.inf) -> Rows:
         """At most ``k`` rows whose contexts and thetas lie nearest to ``context`` and ``theta`` ``(theta_dim,)``, not
@@ -104,13 +104,13 @@ class Memory:
         With more than ``EXACT_UP_TO`` exemplars in memory some of these rows may be missing, see `Neighbours`.
         """
         theta = check_point("theta", theta, self.theta_dim, "was a goal passed instead?")
-        (rows,) = self._policy_side.nearest(self._key(context, theta)[None], k, within)
+        (rows,) = self._by_theta.nearest(self._key(context, theta)[None], k, within)
         return rows[rows >= 0]
 
     def neighbourhoods(self, rows: Rows, k: int, within: float = np.inf) -> Rows:
         """Result of :meth:`near_policies` for the context and theta of each of ``rows``, ``(len(rows), min(k, n))``,
         with -1 where there are fewer; a row is its own neighbour."""
-        return self._policy_side.around(rows, k, within)
+        return self._by_theta.around(rows, k, within)
 
     def copy_for(self, dims: tuple[int, int, int]) -> Memory:
         """A copy for a learner with these dimensions.
@@ -125,9 +125,9 @@ class Memory:
 
     def copy(self) -> Memory:
         """A memory with copies of the exemplars."""
-        same = Memory(self.context_dim, self.theta_dim, self.outcome_dim)
-        same.extend(self.contexts, self.thetas, self.outcomes)
-        return same
+        memory = Memory(self.context_dim, self.theta_dim, self.outcome_dim)
+        memory.extend(self.contexts, self.thetas, self.outcomes)
+        return memory
 
     def extend(self, contexts: Array, thetas: Array, outcomes: Array) -> None:
         """Remember exemplars ``(n, dim)`` that another memory has checked."""
@@ -137,8 +137,8 @@ class Memory:
             lowest, highest = self._range
             self._range = np.array((np.minimum(lowest, thetas.min(axis=0)), np.maximum(highest, thetas.max(axis=0))))
         if self.context_dim:
-            self._outcome_side.keys.append(np.concatenate((contexts, outcomes), axis=1))
-            self._policy_side.keys.append(np.concatenate((contexts, thetas), axis=1))
+            self._by_outcome.keys.append(np.concatenate((contexts, outcomes), axis=1))
+            self._by_theta.keys.append(np.concatenate((contexts, thetas), axis=1))
 
     def _key(self, context: ArrayLike, point: Array) -> Array:
         context = check_point("context", context, self.context_dim, _NO_CONTEXT)

@@ -1,10 +1,10 @@
 """Loads the modules whose functions numba compiles; without this, numba would be loaded with the package.
 
 kernels = compiled("sgimd_torch.inverses.kernels"); kernels.answer(...)
-Numba compiles once for each processor and version. It notices changes of a file, but not of what this file calls. So
-the folder of what it compiles has a checksum of all compiled sources as its name. This folder lies beside this module,
-or in the cache folder of the user if the package cannot be written to, or where ``NUMBA_CACHE_DIR`` says. Two processes
-may compile at once.
+Numba compiles once for each processor and version. It notices changes of a file, but not of the files that this file
+imports. So the cache folder has a checksum of all files in ``MODULES`` as its name. It lies beside this module, or in
+the cache folder of the user if the package cannot be written to, or where ``NUMBA_CACHE_DIR`` says. Two processes may
+compile at once.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, Final
 
+# All files with compiled functions; changes of a file that is missing here would not change the checksum.
 MODULES: Final = ("memory.jit", "memory.scan", "inverses.linear_kernel", "inverses.kernels", "changes.kernels")
 _PACKAGE: Final = Path(__file__).parents[1]
 
@@ -42,7 +43,7 @@ def compiled(name: str) -> ModuleType:
         with event.install_listener("numba:compile", Telling()):
             try:
                 return importlib.import_module(name)
-            except Exception:  # damaged files raise errors of many kinds; any other error is raised again
+            except Exception:  # a damaged cache raises errors of any kind, so it is emptied, and all is compiled anew
                 shutil.rmtree(config.CACHE_DIR, ignore_errors=True)  # type: ignore[attr-defined]
                 return importlib.import_module(name)
     finally:

@@ -10,11 +10,13 @@ from numba import njit, types
 from sgimd_torch.spaces import Array
 
 _FAST: Final = {"reassoc", "contract", "nsz", "arcp"}  # sums may be reordered; NaN and infinity keep their meaning
-inner = njit(nogil=True, fastmath=_FAST)
-NUMBER, NUMBERS = types.float64, types.Array(types.float64, 1, "C", readonly=True)
-TABLE, ROWS = types.Array(types.float64, 2, "C", readonly=True), types.Array(types.int64, 1, "C", readonly=True)
-LISTS = types.Array(types.int64, 2, "C", readonly=True)
-CHANGED_LISTS, CHANGED_TABLE = types.Array(types.int64, 2, "C"), types.Array(types.float64, 2, "C")
+jit_helper = njit(nogil=True, fastmath=_FAST)  # decorator of a function that is compiled only as part of its caller
+NUMBERS: Final = types.Array(types.float64, 1, "C", readonly=True)
+TABLE: Final = types.Array(types.float64, 2, "C", readonly=True)
+ROWS: Final = types.Array(types.int64, 1, "C", readonly=True)  # row numbers of a table
+LISTS: Final = types.Array(types.int64, 2, "C", readonly=True)  # row numbers, one list in each row
+WRITABLE_LISTS: Final = types.Array(types.int64, 2, "C")  # the function writes into the caller's array
+WRITABLE_TABLE: Final = types.Array(types.float64, 2, "C")
 
 
 def compiled_for(*arguments: types.Type) -> Any:
@@ -22,7 +24,7 @@ def compiled_for(*arguments: types.Type) -> Any:
     return njit(tuple(arguments), cache=True, nogil=True, fastmath=_FAST)
 
 
-@inner
+@jit_helper
 def squared_distance(one: Array, other: Array) -> float:
     """Squared distance of two points."""
     total = 0.0
@@ -31,9 +33,9 @@ def squared_distance(one: Array, other: Array) -> float:
     return total
 
 
-@inner
-def columns(table: Array, rows: np.ndarray) -> Array:
-    """``(dim, n)``, these rows of a table."""
+@jit_helper
+def as_columns(table: Array, rows: np.ndarray) -> Array:
+    """These rows of a table, as contiguous columns ``(dim, n)``."""
     selected = np.empty((table.shape[1], len(rows)))
     for j in range(len(rows)):
         for k in range(len(selected)):

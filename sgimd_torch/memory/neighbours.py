@@ -3,7 +3,7 @@
 The memory uses it to find outcomes near a goal (section 4.4.2 of Nguyen & Oudeyer, 2014: H of eq. 8) and movements
 like a given one (K_h). Faiss computes distances in single precision; those that may be among the least are computed
 anew in double precision. Of equally near rows the oldest comes first. Results depend on the rows alone.
-    side = Neighbours(Table(2)); side.keys.append(keys); rows = side.nearest(queries, k=10)
+    neighbours = Neighbours(Table(2)); neighbours.keys.append(keys); rows = neighbours.nearest(queries, k=10)
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ Single = NDArray[np.float32]
 EXACT_UP_TO: Final = 10**5  # largest number of rows for which neighbours are exact; for more, nearly all are found
 LISTED: Final = 20  # number of neighbours in the list of a row
 _SPARE: Final = 8  # number of rows beyond k that cells propose
-_MOST: Final = 1e15  # largest coordinate in single precision, so that squared distances do not overflow
-_FAST: Final = 1, 2, 4, 8, 12  # dimensions for which faiss is several times faster; points get zeros up to these
+_FARTHEST: Final = 1e15  # largest coordinate in single precision, so that squared distances do not overflow
+_FAST_DIMS: Final = 1, 2, 4, 8, 12  # dimensions in which faiss is several times faster; points get zeros up to these
 
 faiss.omp_set_num_threads(1)  # queries last microseconds, and waking threads costs more than it saves
 
@@ -39,8 +39,8 @@ class Neighbours:
     """
 
     def __init__(self, keys: Table) -> None:
-        self.keys, self._changing = keys, RLock()
-        self._width = next((width for width in _FAST if width >= keys.dim), keys.dim)
+        self.keys, self._lock = keys, RLock()
+        self._width = next((width for width in _FAST_DIMS if width >= keys.dim), keys.dim)
         self._index: Any = faiss.IndexFlatL2(self._width)
         # For each row the list of its nearest rows, their squared distances, and the number of rows compared so far.
         self._rows, self._squared = np.empty((0, LISTED), np.int64), np.empty((0, LISTED))
@@ -66,9 +66,9 @@ class Neighbours:
         Raises:
             ValueError: ``k`` is below 1.
         """
-        n, (asked, rows, squared, compared), key = len(self.keys), self._last, query.tobytes()
-        if asked != key or rows.shape[1] < min(n, max(k, LISTED)) or not 1 <= k <= n <= EXACT_UP_TO:
-            rows, squared = self._search(query[None], max(k, LISTED) if k > 0 else k)
+        n, (last_query, rows, squared, compared), key = len(self.keys), self._last, query.tobytes()
+        if last_query != key or rows.shape[1] < min(n, max(k, LISTED)) or not 1 <= k <= n <= EXACT_UP_TO:
+            rows, squared = self._search(query[None], max(k, LISTED) if 1 <= k <= n <= EXACT_UP_TO else k)
         elif compared < n:
             rows, squared = rows.copy(), squared.copy()
             _scan().extend(self.keys.rows, query[None], np.array([compared]), np.zeros(1, np.int64), rows, squared)
@@ -84,7 +84,7 @@ class Neighbours:
         keys, n = self.keys.rows, len(self.keys)
         if not 1 <= k <= LISTED <= n <= EXACT_UP_TO:
             return self.nearest(keys[rows], k, within)
-        with self._changing:
+        with self._lock:
             if n > len(self._compared):
                 old, size = (self._rows, self._squared, self._compared), 2 * n
                 self._rows, self._squared = np.empty((size, LISTED), np.int64), np.empty((size, LISTED))
@@ -107,19 +107,18 @@ class Neighbours:
         keys, n = self.keys.rows, len(self.keys)
         if n == 0:
             return np.empty((len(queries), 0), np.int64), np.empty((len(queries), 0))
-        points = self._single(queries)
+        single_queries = self._single(queries)
         if n > EXACT_UP_TO:
-            lists = [
-                self._search_cells(*question, k) for question in zip(queries[:, None], points[:, None], strict=True)
-            ]
+            pairs = zip(queries[:, None], single_queries[:, None], strict=True)
+            lists = [self._search_cells(*pair, k) for pair in pairs]
             rows, squared = map(np.concatenate, zip(*lists, strict=True))
             return rows, squared
         distances = np.empty((len(queries), n), np.float32)
         vectors = self._index.get_xb()
-        for point, row in zip(points, distances, strict=True):
+        for point, row in zip(single_queries, distances, strict=True):
             pointers = faiss.swig_ptr(row), faiss.swig_ptr(point), vectors
             faiss.fvec_L2sqr_ny(*pointers, self._width, n)  # type: ignore[attr-defined]
-        return _scan().nearest(keys, queries, points, distances, min(k, n))
+        return _scan().nearest(keys, queries, single_queries, distances, min(k, n))
 
     def _search_cells(self, query: Array, point: Single, k: int) -> tuple[Rows, Array]:
         """Result of `_search` for one query, among the rows that the index of cells proposes."""
@@ -128,15 +127,15 @@ class Neighbours:
         if proposed[0] < 0:  # the cells are nearly empty
             proposed = np.arange(len(self.keys))
         distances = np.zeros((1, len(proposed)), np.float32)  # nothing is ruled out
-        places, squared = _scan().nearest(self.keys.rows[proposed], query, point, distances, k)
-        return proposed[places], squared
+        positions, squared = _scan().nearest(self.keys.rows[proposed], query, point, distances, k)
+        return proposed[positions], squared
 
     def _add_new_rows(self) -> None:
         """Add new rows to the index; above ``EXACT_UP_TO``, to an index of cells."""
         n = len(self.keys)
         if self._index.ntotal == n:
             return
-        with self._changing:
+        with self._lock:
             if self._index.ntotal <= EXACT_UP_TO < n:
                 self._index = _cells(self._single(self.keys.rows[:EXACT_UP_TO]), self.keys.dim)
             if self._index.ntotal < n:
@@ -145,7 +144,7 @@ class Neighbours:
     def _single(self, points: Array) -> Single:
         """``points`` ``(n, dim)`` relative to the first row, in single precision; far points are moved nearer."""
         single = np.zeros((len(points), self._width), np.float32)
-        single[:, : self.keys.dim] = np.minimum(np.maximum(points - self.keys.rows[:1], -_MOST), _MOST)
+        single[:, : self.keys.dim] = np.minimum(np.maximum(points - self.keys.rows[:1], -_FARTHEST), _FARTHEST)
         return single
 
 

@@ -13,7 +13,7 @@ class Table:
     """Rows in an array that doubles its size when full."""
 
     def __init__(self, dim: int, rows: Array | None = None) -> None:
-        self._room = np.empty((64, dim))
+        self._storage = np.empty((64, dim))
         self._rows: Array | None = None
         self._n = 0
         if rows is not None:
@@ -28,22 +28,22 @@ class Table:
     @property
     def dim(self) -> int:
         """Number of columns."""
-        return self._room.shape[1]
+        return self._storage.shape[1]
 
     @property
     def rows(self) -> Array:
         """``(n, dim)`` read-only; rows that are added later do not appear in it."""
         if self._rows is None:
-            self._rows = self._room[: self._n]
+            self._rows = self._storage[: self._n]
             self._rows.flags.writeable = False
         return self._rows
 
     def append(self, rows: Array) -> None:
         """Add ``(m, dim)`` rows."""
         n_old, n_new = self._n, self._n + len(rows)
-        if n_new > len(self._room):
-            room = np.empty((max(n_new, 2 * len(self._room)), self.dim))
-            room[:n_old] = self._room[:n_old]
-            self._room = room
-        self._room[n_old:n_new] = rows
+        if n_new > len(self._storage):
+            storage = np.empty((max(n_new, 2 * len(self._storage)), self.dim))
+            storage[:n_old] = self._storage[:n_old]
+            self._storage = storage
+        self._storage[n_old:n_new] = rows
         self._rows, self._n = None, n_new

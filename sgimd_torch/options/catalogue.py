@@ -21,6 +21,7 @@ from typing import Any, Final
 ROD: Final = "fishing-rod"
 _TABLE: Final = """
 algorithm    algorithms.paper           random=random_exploration sagg-riac observation imitation sgim-d
+algorithm    algorithms.paper           sagg-riac-letter sgim-d-letter
 algorithm    algorithms.practice        practice practice-taught
 algorithm    asking.algorithms          sgim-im sgim-im-search sgim-acts sgim-acts-search
 algorithm    rivals.quality_diversity   map-elites=map_elites_alone map-elites-taught=map_elites isoline=isoline_alone
@@ -73,7 +74,7 @@ for _kind, _module, *_names in map(str.split, _TABLE.strip().splitlines()):
         WORDS[_kind][_name] = _module if _kind == "command" else f"{_module}:{_member or _name.replace('-', '_')}"
 # Default teacher of each taught algorithm; "teachers": the algorithm asks teachers. Other algorithms learn alone.
 TAUGHT_BY: Final = {
-    **dict.fromkeys(("observation", "imitation", "sgim-d"), "periodic"),
+    **dict.fromkeys(("observation", "imitation", "sgim-d", "sgim-d-letter"), "periodic"),
     **dict.fromkeys((word for word in WORDS["algorithm"] if word.endswith("-taught")), "periodic"),
     "practice-taught": "at-once",
     **dict.fromkeys((word for word, at in WORDS["algorithm"].items() if at.startswith("asking.")), "teachers"),
@@ -97,7 +98,7 @@ def place_of(kind: str, word: str) -> str:
         meant = f"is it {module}:{name}?" if dot else "or, for code of your own, package.module:attribute"
         if name in ("xml", "urdf"):
             meant = f"for a model file write --environment mujoco --environment.model {word}: docs/how-to/mujoco.md"
-        raise unknown(kind, word, WORDS[kind], f"; {meant}")
+        raise unknown_name_error(kind, word, WORDS[kind], f"; {meant}")
     return word
 
 
@@ -151,7 +152,7 @@ def function_of(make: Callable[..., Any]) -> Callable[..., Any]:
     return function_of(make.func) if isinstance(make, partial) else make
 
 
-def unknown(what: str, word: str, known: Collection[str], also: str = "") -> ValueError:
+def unknown_name_error(what: str, word: str, known: Collection[str], also: str = "") -> ValueError:
     """The error for an unknown ``word``; the message has the nearest ``known`` name, all known names, and ``also``."""
     near = did_you_mean(word, known)
     return ValueError(f"unknown {what} {word!r}{f'{near} Known' if near else '; known'} are {', '.join(known)}{also}")

@@ -26,13 +26,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     again = [*program, "run", *argv, *([] if resume else ["--resume"])]
     with loading():
         from sgimd_torch.runs.directory import (
-            FILE,
+            RUN_FILE,
             build_again,
             holds_run,
             with_found_earlier,
         )  # loaded late, so --help is fast
         from sgimd_torch.runs.run import run_one
-    parts = build_again(with_found_earlier(config), recorded=resume and holds_run(config.directory / FILE))
+    parts = build_again(with_found_earlier(config), recorded=resume and holds_run(config.directory / RUN_FILE))
     with Stopping() as stopping:
         print(run_one(parts, stopping, resume=resume, again=shlex.join(again)))
     return 0

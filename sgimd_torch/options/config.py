@@ -32,7 +32,7 @@ class Config:
     """One run.
 
     Args:
-        algorithm: learner, see below.
+        algorithm: learner, see below; the default needs no teacher, as an unknown robot has none.
         seed: random seed; two runs with equal options and an equal seed are equal.
         movements: number of movements, rests included.
         until: mean error (unit of T) that ends the run once it is expected; null: none.

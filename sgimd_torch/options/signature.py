@@ -30,6 +30,7 @@ _NAMES: Final[dict[Any, str]] = {  # names of types, for help and errors
     types.NoneType: "null",
     tuple[float, ...]: "numbers with commas",
     tuple[float, float]: "two numbers with a comma between",
+    tuple[float, float, float]: "three numbers with commas",
     tuple[int, ...]: "whole numbers with commas",
     tuple[str, ...]: "names with commas",
 }

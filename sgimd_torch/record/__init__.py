@@ -43,8 +43,7 @@ from sgimd_torch.spaces import Demonstration
 
 __all__ = ["DERIVED", "Dims", "Record", "ReplayError", "RunError", "layout"]
 
-_PATIENCE: Final = 60.0  # s, longest time that a commit waits for readers of other programs
-_IMPATIENCE: Final = 0.1  # s, the same for a commit that can be made later
+_PATIENCE: Final = 0.1  # s, longest time that a commit waits for readers of other programs
 _ROWS_AT_ONCE: Final = 4096  # number of rows that one query reads
 
 
@@ -161,27 +160,23 @@ class Record:
         self._n_rows[table] = 0
         self._append(table, [plain(row) for row in rows])
 
-    def commit(self, *, wait: bool = True) -> bool:
+    def commit(self) -> bool:
         """Bring all new rows and ``about`` to the disk, or nothing.
 
-        Args:
-            wait: whether to wait for other programs that are reading the file. If False, the rows stay for the next
-                commit while a program is reading.
-
         Returns:
-            Whether the rows are on the disk.
+            Whether the rows are on the disk; if another program is reading the file, they stay for the next commit.
 
         Raises:
             OSError: the disk is full or cannot be written; earlier commits remain.
-            RunError: another process has written in the meantime, or has read for too long.
+            RunError: another process has written in the meantime.
         """
         self.replace_rows("about", _about_rows(self.about, self._n_rows))
         with self._translated_errors(writing=True):
-            self._connection.execute(f"PRAGMA busy_timeout = {int(1000 * (_PATIENCE if wait else _IMPATIENCE))}")
+            self._connection.execute(f"PRAGMA busy_timeout = {int(1000 * _PATIENCE)}")
             try:
                 self._connection.execute("COMMIT")
             except sqlite3.OperationalError as error:
-                if wait or error.sqlite_errorcode != sqlite3.SQLITE_BUSY:
+                if error.sqlite_errorcode != sqlite3.SQLITE_BUSY:
                     raise
                 return False
             self._lock()

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any
 
-from sgimd_torch.environments.protocol import BatchEnvironment, Environment, RobotCount
+from sgimd_torch.environments.protocol import BatchEnvironment, Environment
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.session import Execute, live
 from sgimd_torch.spaces import Array, Failure
@@ -27,9 +27,9 @@ def check_at_once(environment: Environment, at_once: int) -> None:
     Raises:
         ValueError: the environment has a lower limit.
     """
-    if isinstance(environment, RobotCount) and at_once > environment.at_once:
-        name = type(environment).__name__
-        raise ValueError(f"at_once must be at most {environment.at_once}, the at_once of {name}, got {at_once}")
+    most = getattr(environment, "at_once", at_once)  # of the driver of a single robot, for example
+    if at_once > most:
+        raise ValueError(f"at_once must be at most {most}, the at_once of {type(environment).__name__}, got {at_once}")
 
 
 def executing(

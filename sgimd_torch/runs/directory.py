@@ -25,10 +25,11 @@ from sgimd_torch.options.config import FILES, Config, differ, words
 from sgimd_torch.record import Dims, Record, RunError
 from sgimd_torch.runs.signals import say
 
-FILE: Final = "run.sqlite"
+RUN_FILE: Final = "run.sqlite"
 THREADS: Final = "environment.threads"
 DEVICE: Final = "inverse.accelerator"
-PLACE: Final = ("seed", "out", "name", "board", THREADS, DEVICE)  # seed, place, display and speed of a run
+# Settings in which runs may differ: they name, show or speed up a run.
+NOT_COMPARED: Final = ("seed", "out", "name", "board", THREADS, DEVICE)
 EVALUATES: Final = ("evaluated_by", "repeats", "floor_at", "benchmark_crc32")  # equal options of all evaluations
 MAY_CHANGE: Final = (
     *("movements", "until", "out", "name", "board", "failures", "evaluate_at"),
@@ -57,7 +58,7 @@ def open_run(parts: RunParts, *, resume: bool) -> tuple[Record, list[str]]:
     """
     config, robot = parts.config, parts.environment
     spaces = {"contexts": robot.contexts, "policies": robot.policies, "outcomes": robot.outcomes}
-    path, notes = config.directory / FILE, list[str]()
+    path, notes = config.directory / RUN_FILE, list[str]()
     about: dict[str, Any] = {
         "settings": config.settings,
         "files": parts.data,
@@ -96,12 +97,12 @@ def with_found_earlier(config: Config) -> Config:
     names = {
         f"environment.{name}" for name in getattr(function_of(config.chosen["environment"].make), "FOUND_OPTIONS", ())
     }
-    if not names or not holds_run(config.directory / FILE):
+    if not names or not holds_run(config.directory / RUN_FILE):
         return config
-    with Record(config.directory / FILE) as record:
+    with Record(config.directory / RUN_FILE) as record:
         before = record.about.get("settings", {})
     own = {name: value for name, value in config.settings.items() if name.startswith("environment")}
-    if any(differ(before.get(name), own[name]) for name in own.keys() - names - {*PLACE}):
+    if any(differ(before.get(name), own[name]) for name in own.keys() - names - {*NOT_COMPARED}):
         return config  # it is another robot's run
     earlier = {name: before[name] for name in names & before.keys() if name not in dict(config.parts)}
     return Config.from_settings({**config.settings, **earlier})

@@ -13,7 +13,7 @@ from pathlib import Path
 from sgimd_torch.learner import Learner
 from sgimd_torch.record import ReplayError
 from sgimd_torch.record.saving import repeated
-from sgimd_torch.runs.directory import FILE, build_again, changed_versions, versions_of
+from sgimd_torch.runs.directory import RUN_FILE, build_again, changed_versions, versions_of
 from sgimd_torch.runs.read import config_of, read_run
 
 
@@ -51,7 +51,7 @@ class OpenRun:
     def __init__(self, path: str | os.PathLike[str], *, trust: bool = False) -> None:
         self.recorded = read_run(path)
         self.parts = build_again(config_of(self.recorded, trust=trust))
-        self._episodes = repeated(self.parts.learner, Path(path) / FILE)
+        self._episodes = repeated(self.parts.learner, Path(path) / RUN_FILE)
 
     def replay(self, movements: int | None = None) -> None:
         """Let the learner repeat its record until it has made this number of ``movements``; None: to the end.

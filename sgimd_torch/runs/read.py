@@ -20,7 +20,7 @@ from sgimd_torch.files import checksum
 from sgimd_torch.learner.events import Kind
 from sgimd_torch.options.config import FILES, OWN, Config, differ
 from sgimd_torch.record import DERIVED, Record, RunError, layout
-from sgimd_torch.runs.directory import FILE, PLACE, code_of, with_found_earlier
+from sgimd_torch.runs.directory import NOT_COMPARED, RUN_FILE, code_of, with_found_earlier
 from sgimd_torch.spaces import Array, Box, Demonstration
 
 Columns = dict[str, np.ndarray]
@@ -137,12 +137,12 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         RunError: there is no run at ``path``, or its record is damaged.
     """
     path = Path(path)
-    if not (path / FILE).exists():
-        raise RunError(f"{path} holds no run; runs are in OUT/NAME/seed-000 and have a file {FILE}")
-    with Record(path / FILE) as record:
+    if not (path / RUN_FILE).exists():
+        raise RunError(f"{path} holds no run; runs are in OUT/NAME/seed-000 and have a file {RUN_FILE}")
+    with Record(path / RUN_FILE) as record:
         about = record.about
         if "settings" not in about:
-            raise RunError(f"{path / FILE} is a life that save_life wrote, not a run")
+            raise RunError(f"{path / RUN_FILE} is a life that save_life wrote, not a run")
         settings = about["settings"]
         seed = re.fullmatch(r"seed-(\d+)", path.resolve().name)
         if seed is not None and int(seed[1]) != settings["seed"]:
@@ -258,7 +258,7 @@ def find_runs(place: str | os.PathLike[str]) -> dict[str, list[Path]]:
     """
     place, paths = Path(place), dict[str, list[Path]]()
     for pattern in ("", "seed-*/", "*/seed-*/"):
-        for file in sorted(place.glob(pattern + FILE)):
+        for file in sorted(place.glob(pattern + RUN_FILE)):
             paths.setdefault(Path(os.path.abspath(file)).parent.parent.name, []).append(file.parent)
     if not paths:
         why = "holds no runs" if place.is_dir() else "is a file, not a folder" if place.exists() else "does not exist"
@@ -271,7 +271,7 @@ def finished(config: Config) -> bool:
     try:
         run, wanted = read_run(config.directory), with_found_earlier(config).settings
         settings = run.config
-        names = (settings.keys() | wanted.keys()) - {*PLACE}
+        names = (settings.keys() | wanted.keys()) - {*NOT_COMPARED}
         others = any(differ(settings.get(name), wanted.get(name)) for name in names)
         return bool(run.summary["finished"] and not others) and all(
             config[name] is None or run.files.get(f"{name}_crc32") in (None, checksum(config[name])) for name in FILES
@@ -283,7 +283,7 @@ def finished(config: Config) -> bool:
 def movements_on_disk(path: Path) -> int:
     """Number of movements in the record of a run directory."""
     try:
-        with Record(path / FILE) as record:
+        with Record(path / RUN_FILE) as record:
             return record.movements
     except RunError:
         return 0

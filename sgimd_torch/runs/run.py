@@ -8,13 +8,13 @@ from __future__ import annotations
 import math
 import time
 import traceback
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import partial
-from typing import Final, Protocol, Self, runtime_checkable
+from typing import Any, Final, Protocol, Self
 
-from sgimd_torch.environments.protocol import FAILURES, SimulationError
+from sgimd_torch.environments.protocol import FAILURES, SimulationError, reason_of
 from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.learner.events import Event, Kind
 from sgimd_torch.options.build import RunParts
@@ -23,7 +23,7 @@ from sgimd_torch.runs.at_once import executing
 from sgimd_torch.runs.directory import open_run
 from sgimd_torch.runs.evaluations import Evaluations, ends_now
 from sgimd_torch.runs.signals import Failed, Progress, Stopped, Stopping, say
-from sgimd_torch.session import NoOutcomeError, reason_of, run
+from sgimd_torch.session import NoOutcomeError, run
 from sgimd_torch.spaces import Episode
 
 N_TOLD: Final = 3  # number of failures with a message each; later ones are only counted
@@ -87,9 +87,8 @@ class RunLoop:
         self.seconds = Seconds(self.record.about.get("seconds", {}))
         self.evaluations = Evaluations(parts, self.record)
         parts.learner.listeners.append(self._hear)
-        self.listeners: list[Listener] = [
-            part.listener(self) for part in parts.learner.problem.trained if isinstance(part, Listening)
-        ]
+        trained: Sequence[Any] = parts.learner.problem.trained
+        self.listeners: list[Listener] = [part.listener(self) for part in trained if hasattr(part, "listener")]
         if parts.config.board:
             from sgimd_torch.board.listener import BoardListener  # loaded here, as most runs have no board
 
@@ -213,7 +212,7 @@ class RunLoop:
 
     def _try_commit(self) -> bool:
         self.record.about["seconds"] = self.seconds.summary()
-        return self.record.commit(wait=False)
+        return self.record.commit()
 
     def _after(self, episode: Episode) -> None:
         replayed = self.replaying
@@ -291,14 +290,6 @@ class Listener(Protocol):
     def close(self) -> None:
         """The run has ended, or was stopped."""
         return
-
-
-@runtime_checkable
-class Listening(Protocol):
-    """A trained part of a learner that has a listener in a run."""
-
-    def listener(self, loop: RunLoop) -> Listener:
-        """The listener in the run of this ``loop``."""
 
 
 class Seconds:

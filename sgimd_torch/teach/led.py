@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
 
 import mujoco
 import numpy as np
@@ -59,16 +58,6 @@ class HandLed:
     place: Callable[[Array], Array] = on_the_plane
 
 
-@runtime_checkable
-class Leadable(Protocol):
-    """An environment of your own that can be led by the hand."""
-
-    @property
-    def hand_led(self) -> HandLed:
-        """Model, led joints and limits of the robot in the context 0."""
-        ...
-
-
 def hand_led_of(task: Task) -> HandLed:
     """Model, led joints and limits of the robot of a task.
 
@@ -76,8 +65,9 @@ def hand_led_of(task: Task) -> HandLed:
         ValueError: the robot cannot be led, or it has no correspondence to translate recordings.
     """
     robot = task.environment
-    if isinstance(robot, Leadable) and isinstance(robot.hand_led, HandLed):
-        led = robot.hand_led
+    own = getattr(robot, "hand_led", None)
+    if isinstance(own, HandLed):
+        led = own
     elif isinstance(robot, FishingRod):
         led = rod_led(robot)
     elif isinstance(robot, PlanarArm):

@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from sgimd_torch.options.config import Config
-from sgimd_torch.runs.directory import FILE, build_again, holds_run
+from sgimd_torch.runs.directory import RUN_FILE, build_again, holds_run
 from sgimd_torch.runs.run import RunLoop
 from sgimd_torch.spaces import Array, Demonstration, stream
 from sgimd_torch.teach.by_hand import BY_HAND, ByHand
@@ -68,7 +68,7 @@ class TaughtRun:
     """
 
     def __init__(self, config: Config) -> None:
-        on_disk = holds_run(config.directory / FILE)
+        on_disk = holds_run(config.directory / RUN_FILE)
         parts = build_again(config, recorded=on_disk)
         self.config, self.led = parts.config, hand_led_of(parts.task)
         if parts.learner.social is None or parts.teachers:

@@ -33,12 +33,13 @@ import numpy as np
 
 from sgimd_torch.environments.check import check_environment
 from sgimd_torch.environments.protocol import Environment, execute_many
+from sgimd_torch.environments.sketch import traced
 from sgimd_torch.options.build import task_of
 from sgimd_torch.options.command_line import parse
 from sgimd_torch.runs.signals import parser_of
 from sgimd_torch.runs.tasks import Task, benchmark_of
 from sgimd_torch.runs.tasks.taught import demonstrations_of
-from sgimd_torch.spaces import check_count, stream
+from sgimd_torch.spaces import Failure, check_count, stream
 from sgimd_torch.views.demonstrations import check
 
 TRIED = 20  # number of random movements that estimate the reached part of T
@@ -86,13 +87,13 @@ def _check_picture(task: Task) -> None:
     Raises:
         ValueError: the outcomes differ, or the movement cannot be traced; see `traced`.
     """
-    robot, trace = task.environment, task.picture
-    if trace is None:
+    robot = task.environment
+    if getattr(robot, "trace", None) is None:
         return
     context, theta = robot.observe(stream(0, "check")), robot.policies.sample(stream(1, "check"))
     outcome = robot.execute(context.copy(), theta.copy(), stream(2, "check"))
     name = type(robot).__name__
-    drawn = trace(context, theta, stream(2, "check")).outcome
+    drawn = traced(robot, context, theta, stream(2, "check")).outcome
     if not np.array_equal(drawn, outcome):
         raise ValueError(
             f"trace() of {name} ends at {drawn.tolist()}, execute() with an equal stream at "
@@ -110,7 +111,10 @@ def _narrow(robot: Environment) -> list[str]:
     """A warning if random movements end outside T, or if their outcomes span a small part of T; [] for none."""
     space, rngs = robot.outcomes, [stream(k, "check") for k in range(TRIED)]
     contexts, thetas = [robot.observe(rng) for rng in rngs], [robot.policies.sample(rng) for rng in rngs]
-    outcomes = execute_many(robot, contexts, thetas, rngs)
+    executed = execute_many(robot, contexts, thetas, rngs)
+    if lost := [outcome.reason for outcome in executed if isinstance(outcome, Failure)]:
+        return [f"{len(lost)} of {TRIED} random movements failed, such as: {lost[0]}"]
+    outcomes = np.array(executed)
     low, high = outcomes.min(axis=0), outcomes.max(axis=0)
     share = float(np.prod((high - low) / space.sides))
     spans = " x ".join(f"[{a:.3g}, {b:.3g}]" for a, b in zip(low, high, strict=True))

@@ -37,14 +37,14 @@ from sgimd_torch.demonstrations.columns import ColumnNames, Recording
 from sgimd_torch.demonstrations.fit import beyond_limits, misfit_of
 from sgimd_torch.demonstrations.text import read_text
 from sgimd_torch.demonstrations.units import in_units, paced
-from sgimd_torch.environments.protocol import Replaying, SimulationError, execute_many, primitive_of
+from sgimd_torch.environments.protocol import Replaying, SimulationError, primitive_of
 from sgimd_torch.files import check_regular
 from sgimd_torch.options.build import task_of
 from sgimd_torch.options.command_line import parse
 from sgimd_torch.runs.signals import parsed_argument, parser_of, say
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.runs.tasks.taught import theta_of
-from sgimd_torch.spaces import Array, Box, Demonstration, stream
+from sgimd_torch.spaces import Array, Box, Demonstration, check_point, stream
 from sgimd_torch.views.results import print_table
 
 HEADS: Final = ("recording", "lasts (s)", "samples", "says", "lands", "apart", "misfit", "remarks")
@@ -213,7 +213,8 @@ def check(task: Task, demonstration: Demonstration, row: int) -> Checked:
             )
         context = robot.contexts.check("its context", demonstration.context)
         theta = theta_of(task, demonstration)
-        lands = execute_many(robot, context[None], theta[None], [stream(row, "demonstrations check")])[0]
+        executed = robot.execute(context.copy(), theta.copy(), stream(row, "demonstrations check"))
+        lands = check_point("outcome", executed, robot.outcomes.dim)
         if not demonstration.outcome.size:
             outcome = lands
             if isinstance(robot, Replaying) and not context.size:  # a replay has no context

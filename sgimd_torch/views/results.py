@@ -1,4 +1,4 @@
-"""The table of results, one row for each variant, and tables on stdout as text, as csv, or for LaTeX.
+"""The table of results, one row for each variant, and tables on stdout, as text or as csv.
 
     for column in results(variants): column.head, column.texts()    # of sgimd table and of sgimd report
     print_table([("variant", "error (m)"), ("sgim-d", "0.123"), ("random", "0.456")])    # the first row is the head
@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import csv
 import io
-import re
 from collections.abc import Iterable, Sequence
 from typing import Final, NamedTuple
 
@@ -23,12 +22,6 @@ from sgimd_torch.views.statistics import Interval, interval_text, over_seeds
 from sgimd_torch.views.variants import EARLY, Variant, unit_of
 
 MISSING: Final = "-"  # text of a number that is not known
-LATEX: Final = {  # signs that have a meaning in LaTeX
-    **{sign: f"\\{sign}" for sign in "&%$#_{}"},
-    "\\": r"\textbackslash{}",
-    "~": r"\textasciitilde{}",
-    "^": r"\textasciicircum{}",
-}
 
 
 class Column(NamedTuple):
@@ -55,14 +48,14 @@ def results(variants: Sequence[Variant]) -> list[Column]:
     unit = unit_of(variants)
 
     def at_last(column: str) -> list[Interval | None]:
-        return [variant.at(variant.last, column) for variant in variants]
+        return [variant.at(variant.compared_at, column) for variant in variants]
 
-    if any(variant.last for variant in variants):
+    if any(variant.compared_at for variant in variants):
         expected = at_last("expected_error")
-        early = [variant.at(EARLY) if variant.last > EARLY else None for variant in variants]
+        early = [variant.at(EARLY) if variant.compared_at > EARLY else None for variant in variants]
         columns = [
             Column("seeds", [Interval(len(variant.used)) for variant in variants], ".0f"),
-            Column("movements", [Interval(variant.last) if variant.last else None for variant in variants], ".0f"),
+            Column("movements", [Interval(at) if (at := variant.compared_at) else None for variant in variants], ".0f"),
             *([Column(unit(f"error at {EARLY}"), early)] if any(early) else []),
             Column(unit("error"), at_last("mean_error")),
             *([Column(unit("expected error"), expected)] if any(expected) else []),
@@ -70,7 +63,7 @@ def results(variants: Sequence[Variant]) -> list[Column]:
             Column(unit("noise floor"), [floor and Interval(floor.value) for floor in at_last("noise_floor")]),
         ]
     else:
-        own = [variant.own for variant in variants]
+        own = [variant.own_goals for variant in variants]
         columns = [
             Column("seeds", [Interval(len(variant.runs)) for variant in variants], ".0f"),
             Column("movements", [Interval(int(curve.movements[-1])) for curve in own], ".0f"),
@@ -99,16 +92,3 @@ def print_csv(rows: Iterable[Sequence[str]]) -> None:
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows([printable(cell) for cell in row] for row in rows)
     print(text.getvalue(), end="", flush=True)
-
-
-def print_latex(rows: Sequence[Sequence[str]]) -> None:
-    """Print rows as a ``tabular`` of LaTeX, which needs no package; numbers are aligned to the right."""
-    head, *lines = [" & ".join(map(_in_latex, row)) + r" \\" for row in rows]
-    print(rf"\begin{{tabular}}{{l{'r' * (len(rows[0]) - 1)}}}", r"\hline", head, r"\hline", *lines, sep="\n")
-    print(r"\hline", r"\end{tabular}", sep="\n", flush=True)
-
-
-def _in_latex(cell: str) -> str:
-    """The text of a cell in LaTeX; a minus before a digit is set as one."""
-    text = "".join(LATEX.get(sign, sign) for sign in printable(cell).replace("\n", " "))
-    return re.sub(r"(?<![\w.])-(?=\d)", "$-$", text)

@@ -16,7 +16,7 @@ median distance, the share met within the tolerance, and the share of all moveme
   sgimd table runs
   sgimd table study --at 2000                      before all runs are finished
   sgimd table study --baseline goals=interest-map  with differences from this variant
-  sgimd table study --format latex                 for a paper; csv has all digits, and columns for the intervals
+  sgimd table study --format csv                   with all digits, and columns for the intervals
 
 Exit code: 0 a table was printed, 2 there is nothing to show.
 """
@@ -31,7 +31,7 @@ from sgimd_torch.record import RunError
 from sgimd_torch.runs.directory import MAY_CHANGE
 from sgimd_torch.runs.read import Run
 from sgimd_torch.runs.signals import parser_of, say
-from sgimd_torch.views.results import Column, print_csv, print_latex, print_table, results
+from sgimd_torch.views.results import Column, print_csv, print_table, results
 from sgimd_torch.views.statistics import LEAST_SEEDS
 from sgimd_torch.views.variants import Variant, baseline_of, best_first, compare, differing, read_runs, unit_of
 
@@ -42,9 +42,8 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument("runs", type=Path, metavar="RUNS", help="folder of a run, of a variant or of several variants")
     parser.add_argument("--at", type=int, metavar="MOVEMENTS", help="number of movements at which to compare")
     parser.add_argument("--baseline", metavar="NAME", help="variant to compare the others with, seed by seed")
-    parser.add_argument(
-        "--format", choices=("text", "csv", "latex"), default="text", help="form of the table (default: %(default)s)"
-    )
+    forms = "form of the table (default: %(default)s)"
+    parser.add_argument("--format", choices=("text", "csv"), default="text", help=forms)
     return parser
 
 
@@ -80,8 +79,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         parts = [part for column in columns for part in column.parts()]
         print_csv(zip(["variant", *names], *parts, strict=True))
     else:
-        rows = list(zip(["variant", *names], *([column.head, *column.texts()] for column in columns), strict=True))
-        (print_latex if options.format == "latex" else print_table)(rows)
+        cells = ([column.head, *column.texts()] for column in columns)
+        print_table(list(zip(["variant", *names], *cells, strict=True)))
     if few := [f"{variant.name} ({len(variant.used or variant.runs)})" for variant in variants if variant.few]:
         say(f"fewer than {LEAST_SEEDS} seeds, too few for an interval: {', '.join(few)}")
     for variant in variants:

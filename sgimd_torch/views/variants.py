@@ -20,8 +20,8 @@ from tqdm import tqdm
 
 from sgimd_torch.evaluation import RECENT, OwnGoals
 from sgimd_torch.figures.names import label
-from sgimd_torch.options.catalogue import unknown
-from sgimd_torch.runs.directory import FILE, PLACE
+from sgimd_torch.options.catalogue import unknown_name_error
+from sgimd_torch.runs.directory import NOT_COMPARED, RUN_FILE
 from sgimd_torch.runs.read import Run, find_runs, read_run
 from sgimd_torch.runs.signals import say
 from sgimd_torch.spaces import Array
@@ -33,7 +33,7 @@ USUAL: Final = "sgim-d"  # name of the default baseline
 
 
 def read_runs(place: Path) -> dict[str, list[Run]]:
-    """All runs below a folder, by name of the variant, without their thetas; folders without a run are named.
+    """All runs below a folder, by name of the variant, without their thetas; folders without a run are reported.
 
     Raises:
         RunError: there are no runs, or one is damaged.
@@ -41,8 +41,8 @@ def read_runs(place: Path) -> dict[str, list[Run]]:
     runs: dict[str, list[Run]] = {}
     places = [(name, path) for name, paths in find_runs(place).items() for path in paths]
     for folder in sorted([*place.glob("seed-*/"), *place.glob("*/seed-*/")]):
-        if not os.path.isfile(folder / FILE):
-            say(f"left out: {folder} has no {FILE} that can be read")
+        if not os.path.isfile(folder / RUN_FILE):
+            say(f"left out: {folder} has no {RUN_FILE} that can be read")
     for name, path in tqdm(places, "reading", unit="", delay=1.0, disable=None):
         run = replace(read_run(path), thetas=np.empty((0, 0)))  # thetas need much memory, and no view shows them
         runs.setdefault(name, []).append(run)
@@ -66,7 +66,7 @@ def differing(variants: Sequence[Variant]) -> dict[str, list[str]]:
     values_of = {}
     for name in dict.fromkeys(name for variant in variants for run in variant.runs for name in run.config):
         values = [dict.fromkeys(text_of(run.config.get(name)) for run in variant.runs) for variant in variants]
-        if name not in PLACE and len(set().union(*values)) > 1:
+        if name not in NOT_COMPARED and len(set().union(*values)) > 1:
             values_of[name] = [" or ".join(texts) for texts in values]
     return values_of
 
@@ -93,21 +93,22 @@ class Variant:
         self.runs = sorted(runs, key=lambda run: int(run.config["seed"]))
         self.algorithm = str(self.runs[0].config["algorithm"])
         self.environment, self.space = str(self.runs[0].config["environment"]), self.runs[0].spaces["outcomes"]
-        evaluated = [run for run in self.runs if len(run.evaluations["own"]["movements"])]
+        evaluated = [run for run in self.runs if len(run.evaluations["own"]["movements"])]  # by the run's own inverse
         if at is None:
             self.used = [run for run in evaluated if run.summary["finished"]] or evaluated
         else:
             self.used = [run for run in evaluated if at in run.evaluations["own"]["movements"]]
         moments = [run.evaluations["own"]["movements"] for run in self.used]
-        self.evaluated: NDArray[np.int64] = reduce(np.intersect1d, moments or [np.empty(0)]).astype(np.int64)
-        self.last = at or (int(self.evaluated[-1]) if len(self.evaluated) else 0)  # number of movements
+        self.evaluated_at: NDArray[np.int64] = reduce(np.intersect1d, moments or [np.empty(0)]).astype(np.int64)
+        last = int(self.evaluated_at[-1]) if len(self.evaluated_at) else 0
+        self.compared_at = last if at is None else at  # number of movements; 0: no evaluation
 
     def values(self, movements: int, column: str = "mean_error") -> Array:
         """``(n_seeds,)`` values of a column of the evaluations after ``movements`` movements; NaN: no evaluation."""
         return np.array([run.at(movements, column) for run in self.used], dtype=np.float64)
 
     def at(self, movements: int, column: str = "mean_error") -> Interval | None:
-        """Interquartile mean of ``values`` with its interval; None if a value is missing."""
+        """Interquartile mean of ``values`` with its bootstrap interval of 95 %; None if a value is missing."""
         return over_seeds(self.values(movements, column))
 
     @property
@@ -117,27 +118,27 @@ class Variant:
 
     @cached_property
     def errors(self) -> Array:
-        """``(n_seeds, n)`` m, errors at ``evaluated``."""
+        """``(n_seeds, n)`` in the unit of T, errors at ``evaluated_at``."""
         return self._over_time("mean_error")
 
     @cached_property
     def floors(self) -> Array:
-        """``(n_seeds, n)`` m, noise floors at ``evaluated``; NaN where they were not measured."""
+        """``(n_seeds, n)`` in the unit of T, parts of the errors that noise alone makes; NaN where not measured."""
         return self._over_time("noise_floor")
 
     @cached_property
     def curve(self) -> Array:
-        """``(3, n)`` m: interquartile mean over seeds at each of ``evaluated``, and both ends of its interval."""
+        """``(3, n)``: interquartile mean of errors over seeds at ``evaluated_at``, and both ends of its interval."""
         numbers = [over_seeds(column) or (np.nan,) * 3 for column in self.errors.T]
         return np.array(numbers, dtype=np.float64).reshape(-1, 3).T
 
     @cached_property
     def last_error(self) -> Interval | None:
-        """The error (m) at the evaluation where variants are compared, ``last``."""
-        return self.at(self.last)
+        """The error at the evaluation where variants are compared, ``compared_at``."""
+        return self.at(self.compared_at)
 
     @cached_property
-    def own(self) -> OwnCurve:
+    def own_goals(self) -> OwnCurve:
         """How nearly the learners met their own goals; of all runs, up to the length of the shortest."""
         length = min(len(run.index) for run in self.runs)
         movements = np.unique(np.linspace(0, length, POINTS + 1).astype(np.int64))
@@ -150,18 +151,18 @@ class Variant:
 
     @property
     def failed(self) -> Array:
-        """``(n_seeds,)``, shares of the movements that failed."""
+        """``(n_seeds,)``, shares of all movements of a run that failed."""
         return np.array([run.summary["failed"] / max(run.summary["movements"], 1) for run in self.runs])
 
     @cached_property
     def landed(self) -> Array:
-        """``(n, outcome_dim)`` m, outcomes of all movements in all runs."""
+        """``(n, outcome_dim)``, outcomes of all movements in all runs."""
         outcomes = np.concatenate([run.outcomes for run in self.runs])
         return outcomes[np.isfinite(outcomes).all(axis=1)]
 
     @cached_property
     def demonstrated(self) -> Array:
-        """``(n, outcome_dim)`` m, outcomes of the demonstrations shown in all runs."""
+        """``(n, outcome_dim)``, outcomes of the demonstrations shown in all runs."""
         outcomes = [demonstration.outcome for run in self.runs for demonstration in run.demonstrations]
         return np.array(outcomes, dtype=np.float64).reshape(len(outcomes), self.landed.shape[1])
 
@@ -170,21 +171,21 @@ class Variant:
         """Goals ``(n, outcome_dim)`` of the last evaluation, their errors ``(n,)``, and those that the learners
         expected, NaN if they did not say; all are means over seeds."""
         goals = self.typical.benchmark
-        both = [run.missed_by(self.last) for run in self.used if np.array_equal(run.benchmark, goals)]
+        both = [run.missed_by(self.compared_at) for run in self.used if np.array_equal(run.benchmark, goals)]
         errors, expected = np.mean(both, axis=0)
         return goals, errors, expected
 
     @property
     def expects(self) -> bool:
         """Whether the learners said at the last evaluation which errors they expected."""
-        return bool(self.last) and bool(np.isfinite(self.misses[2]).all())
+        return bool(self.compared_at) and bool(np.isfinite(self.misses[2]).all())
 
     @property
     def typical(self) -> Run:
         """The run with the median last error, or the better of two such runs; figures of a single run show it."""
-        if not self.last:
+        if not self.compared_at:
             return max(self.runs, key=lambda run: len(run.index))
-        return sorted(self.used, key=lambda run: run.at(self.last))[(len(self.used) - 1) // 2]
+        return sorted(self.used, key=lambda run: run.at(self.compared_at))[(len(self.used) - 1) // 2]
 
     def seconds(self, part: str) -> float:
         """Seconds that a movement took of a ``part``, "physics" or "learner": the mean over all movements of all runs.
@@ -195,8 +196,8 @@ class Variant:
         return sum(run[f"seconds_{part}"] for run in runs) / max(sum(run["movements"] for run in runs), 1)
 
     def _over_time(self, column: str) -> Array:
-        columns = [self.values(movements, column) for movements in self.evaluated.tolist()]
-        return np.array(columns, dtype=np.float64).reshape(len(self.evaluated), len(self.used)).T
+        columns = [self.values(movements, column) for movements in self.evaluated_at.tolist()]
+        return np.array(columns, dtype=np.float64).reshape(len(self.evaluated_at), len(self.used)).T
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,9 +206,9 @@ class OwnCurve:
 
     Args:
         movements: ``(n,)``, numbers of movements, from 0.
-        missed: ``(n_seeds, n)``, median distances missed at the last 50 goals before, in the unit of T.
+        missed: ``(n_seeds, n)``, median distances missed at the last ``RECENT`` goals before, in the unit of T.
         met: ``(n_seeds, n)``, shares of these goals that were met within the tolerance of the run.
-        failed: ``(n_seeds, n)``, shares of the last 50 movements that failed.
+        failed: ``(n_seeds, n)``, shares of the last ``RECENT`` movements that failed.
     """
 
     movements: NDArray[np.int64]
@@ -217,12 +218,12 @@ class OwnCurve:
 
     @property
     def last_missed(self) -> Interval | None:
-        """Median distance missed at the last 50 goals; None if a learner chose no goal."""
+        """Median distance missed at the last ``RECENT`` goals; None if a learner chose no goal."""
         return over_seeds(self.missed[:, -1])
 
     @property
     def last_met(self) -> Interval | None:
-        """Share of the last 50 goals that was met; None if a learner chose no goal."""
+        """Share of the last ``RECENT`` goals that was met; None if a learner chose no goal."""
         return over_seeds(self.met[:, -1])
 
 
@@ -232,25 +233,25 @@ class Comparison:
 
     Args:
         variant: variant that is compared with the baseline.
-        seeds: ``(n_seeds,)`` m, differences at the common seeds.
-        difference: interquartile mean (m) of the differences, with its interval.
+        differences: ``(n_seeds,)`` in the unit of T, one for each common seed.
+        difference: interquartile mean of the differences, with its interval.
     """
 
     variant: Variant
-    seeds: Array
+    differences: Array
     difference: Interval
 
     @property
     def verdict(self) -> str:
         """Verdict by the position of the interval relative to 0, or a text that there are too few seeds."""
-        if len(self.seeds) < LEAST_SEEDS:
+        if len(self.differences) < LEAST_SEEDS:
             return f"fewer than {LEAST_SEEDS} common seeds"
         return "better" if self.difference.high < 0 else "worse" if self.difference.low > 0 else "not told apart"
 
 
 def _own_after(run: Run, goals: OwnGoals, until: int) -> tuple[float, float, float]:
-    """Median distance missed, share met and share failed of the last 50 before movement ``until``; NaN for none."""
-    missed, failed = goals.recent(until), run.failed[max(0, until - RECENT) : until]
+    """Median distance missed, share met and share failed of the last ``RECENT`` before ``until``; NaN for none."""
+    missed, failed = goals.recent_misses(until), run.failed[max(0, until - RECENT) : until]
     median = float(np.median(missed)) if len(missed) else np.nan
     return median, _share(missed <= run.tolerance), _share(failed)
 
@@ -265,25 +266,25 @@ def baseline_of(variants: Sequence[Variant], name: str | None = None) -> Variant
     Raises:
         ValueError: no variant with errors has this name.
     """
-    evaluated = {variant.name: variant for variant in variants if variant.last_error}
+    by_name = {variant.name: variant for variant in variants if variant.last_error}
     if name is None:
-        return evaluated.get(USUAL) or next(iter(evaluated.values()), None)
-    if name not in evaluated:
-        raise unknown("--baseline (a variant with errors)", name, sorted(evaluated))
-    return evaluated[name]
+        return by_name.get(USUAL) or next(iter(by_name.values()), None)
+    if name not in by_name:
+        raise unknown_name_error("--baseline (a variant with errors)", name, sorted(by_name))
+    return by_name[name]
 
 
 def compare(variants: Sequence[Variant], baseline: Variant | None) -> list[Comparison]:
     """Comparisons of variants with the baseline: those that share seeds and the last number of movements with it."""
     if baseline is None:
         return []
-    theirs = _last_errors(baseline)
-    others = [variant for variant in variants if variant is not baseline and variant.last == baseline.last]
-    differences = [(variant, common_differences(_last_errors(variant), theirs)) for variant in others]
+    theirs, at = _last_errors(baseline), baseline.compared_at
+    others = [variant for variant in variants if variant is not baseline and variant.compared_at == at]
+    pairs = [(variant, common_differences(_last_errors(variant), theirs)) for variant in others]
     return [
-        Comparison(variant, seeds, difference) for variant, seeds in differences if (difference := over_seeds(seeds))
+        Comparison(variant, differences, mean) for variant, differences in pairs if (mean := over_seeds(differences))
     ]
 
 
 def _last_errors(variant: Variant) -> dict[int, float]:
-    return {int(run.config["seed"]): run.at(variant.last) for run in variant.used}
+    return {int(run.config["seed"]): run.at(variant.compared_at) for run in variant.used}

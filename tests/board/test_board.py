@@ -21,6 +21,8 @@ from sgimd_torch.board import pictures
 from sgimd_torch.board.curves import Behaviour, branches, evaluation_curves, region_curves
 from sgimd_torch.board.legend import LEGEND
 from sgimd_torch.board.listener import EventFile
+from sgimd_torch.board.own_regions import OwnRegions
+from sgimd_torch.competence import performance
 from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.figures.sections import sections
 from sgimd_torch.options.command_line import main
@@ -47,8 +49,8 @@ def evaluation(errors):
     return Evaluation(errors, nothing, nothing, np.full(len(errors), 0.01), nothing, errors < 0, unknown)
 
 
-def interest_map(n=400):
-    goals = InterestMap(problem(outcomes=PLANE))
+def interest_map(n=400, space=PLANE):
+    goals = InterestMap(problem(outcomes=space))
     rng = stream(0, "competence")
     for _ in range(n):
         goal = goals.sample([])
@@ -128,6 +130,29 @@ def test_a_region_that_was_cut_goes_on_as_the_mean_over_the_goals_of_its_parts()
     assert values["regions/count"] == len(regions)
 
 
+def test_the_board_has_regions_for_goals_that_know_none_with_the_competence_of_the_best_outcome():
+    contexts = Box.cube(0.0, 1.0, 1)
+    world, rng, expected = problem(contexts=contexts, outcomes=PLANE), stream(0, "own regions"), {}
+    behaviour, own = Behaviour(0.02), OwnRegions(world)
+    for index in range(0, 1000, 2):
+        context, goal, outcomes = contexts.sample(rng), PLANE.sample(rng), rng.normal(0, 1, (2, 2))
+        for later, outcome in enumerate(outcomes):
+            behaviour.episode(Episode(index + later, context, Move(np.zeros(1), goal, "local"), outcome, None))
+        expected[(*context, *goal)] = performance(goal, outcomes, world.rest, world.tolerance).max()
+        if index % 50 == 48:
+            own.follow(behaviour)
+            remembered = {tuple(p): c for r in own.regions for p, c in zip(r.points, r.competences, strict=True)}
+            assert remembered == pytest.approx({point: expected[point] for point in remembered})
+            newest = [*expected][-20:-1]  # the last goal may still be pursued
+            assert remembered.keys() >= set(newest)
+            assert tuple([*expected][-1]) not in remembered
+    regions = own.regions
+    assert len(regions) == 8
+    assert all(((r.low <= r.points) & (r.points < r.high)).all() and len(r.points) <= 40 for r in regions)
+    assert sum(np.prod(r.high - r.low) for r in regions) == pytest.approx(4)  # the volume of C x T
+    assert sum(r.attempts for r in regions) >= 499 - 40  # a cut forgets no goal
+
+
 def test_the_share_of_goals_met_is_counted():
     values = evaluation_curves(evaluation([0.01, 0.2, 0.05, 0.0]), 0.05)
     assert values["goals/met"] == 0.75
@@ -143,6 +168,21 @@ def test_the_names_of_regions_lie_where_they_are_and_are_those_of_the_curves():
     assert places.keys() == {path for path in named if not {f"{path}0", f"{path}1"} & named.keys()}
     for path, (x, y) in places.items():
         assert any((r.low <= [x, y]).all() and ([x, y] <= r.high).all() for r in named[path])
+
+
+@pytest.mark.parametrize("high", [(1.0, 1.0), (4.0, 0.8), (0.7, 0.98)])
+def test_pictures_tell_small_errors_apart_and_cut_off_no_label(high):
+    space = Box(np.array([-0.3, -0.42]), np.array(high), ("tip x", "tip y"), "m")
+    goals, regions = space.low + space.sides * stream(0, "goals").random((4, 2)), interest_map(space=space).regions
+    drawn = {}
+    for error in (0.01, 0.02, 0.2):
+        maps = pictures.maps_of(regions, space, goals, np.array([0.0, error, error, error]))
+        drawn[error] = maps["map/error"]
+        for pixels in maps.values():
+            assert all((edge == 255).all() for edge in (pixels[0], pixels[-1], pixels[:, 0], pixels[:, -1]))
+    half = drawn[0.01].shape[1] // 2
+    for less, more in ((0.01, 0.02), (0.02, 0.2)):
+        assert (drawn[less] != drawn[more])[40:, :half].any()  # below the title, left of the colour bar
 
 
 def test_earlier_event_files_stay_until_the_replay_is_over(tmp_path):
@@ -265,9 +305,26 @@ def test_without_evaluations_there_are_curves_of_the_learners_own_goals_and_of_f
     assert command(main, words.split()) == 0
     curves, goals = curves_of(directory), read_run(directory).own_goals()
     for movements in (50, 100, 150):
-        assert curves["goals/missed_by"][movements] == pytest.approx(np.median(goals.recent(movements)))
+        assert curves["goals/missed_by"][movements] == pytest.approx(np.median(goals.recent_misses(movements)))
     assert not any(tag.startswith("error/") for tag in curves)
     assert hparams_of(directory)[1] == ["goals/missed_by"]
+
+
+@pytest.mark.parametrize("algorithm", ["practice", "practice-taught", "sagg-riac", "sgim-d", "random"])
+def test_every_learner_with_goals_has_competence_per_region_and_others_say_that_they_have_none(own, algorithm):
+    words = f"--environment planar-arm-7 --algorithm {algorithm} --repeats 0 --evaluate-at [] --out".split()
+    assert command(main, [*words, "plain", "--movements", "150"]) == 0
+    assert command(main, [*words, "runs", "--movements", "150", "--board", "true"]) == 0
+    assert command(main, [*words, "resumed", "--movements", "80"]) == 0
+    assert command(main, [*words, "resumed", "--movements", "150", "--board", "true", "--resume"]) == 0
+    plain, whole, resumed = (Path(out) / algorithm / "seed-000" for out in ("plain", "runs", "resumed"))
+    assert content_of(plain) == content_of(whole)
+    assert_same_board(resumed, whole)
+    if algorithm == "random":
+        (text,) = board_of(whole).Tensors("about/regions/text_summary")
+        assert text.tensor_proto.string_val[0].decode().startswith("No competence per region")
+    else:
+        assert 150 in curves_of(whole)["competence/R"].keys() & curves_of(whole)["interest/R"].keys()
 
 
 def live_as(robot, *options):

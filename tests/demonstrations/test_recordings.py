@@ -338,60 +338,38 @@ def rewrite(root, name, values):
     pq.write_table(pa.table({**columns, name: values}), last(root))
 
 
-def empty(root):
-    """The last file of a dataset is small, and would fill the memory."""
-    pq.write_table(pa.table({"timestamp": np.zeros(2**25 + 1, np.int8)}), last(root))
+UNKNOWN = {
+    "x": r"x is an entry of several features; write action\[1\] or observation\.place\[0\]",
+    "lft.pos": r"has no feature lft\.pos; did you mean lift\.pos",
+    f"{STATE}[2:4]": r"there is no observation\.state\[2:4\]: observation\.state has 3 entries",
+    f"{STATE}[3]": r"there is no observation\.state\[3\]",
+    f"{STATE}[2:2]": r"there is no observation\.state\[2:2\]",
+}
+HARMS = {
+    "has 3 entries, but names of 2: pan.pos, lift": lambda root: name_entries(root, "pan.pos", "lift.pos"),
+    r"has format v2\.0, v2\.1 and v3 can be read; lerobot": lambda root: change(root, codebase_version="v2.0"),
+    r"is no LeRobot .*: it has no meta/info\.json": lambda root: (root / "meta").rename(root / "meta_data"),
+    r"no feature observation\.state; .* It has action": lambda root: change(root, features={"action": None}),
+    "says 4 episodes, but 3 were found; is a file missing": lambda root: change(root, total_episodes=4),
+    "says 15 frames, but 10 were found": lambda root: last(root).unlink(),
+    r"info\.json is no json": lambda root: (root / "meta/info.json").write_text("{"),
+    r"info\.json must hold an object": lambda root: (root / "meta/info.json").write_text("[]"),
+    "were only its videos copied": lambda root: [file.unlink() for file in last(root).parent.iterdir()],
+    r"\.parquet cannot be read": lambda root: last(root).write_bytes(b"PAR1 of another kind"),
+    r"be read: timestamp has BYTE_ARRAY, no numbers": lambda root: rewrite(root, "timestamp", ["late"] * 5),
+    r"row \d+: timestamp must be finite": lambda root: rewrite(root, "timestamp", [0.0, None, 2, 3, 4]),
+    "cannot be read: setting an array": lambda root: rewrite(root, STATE, [[[0.0, 1.0], [1.0]]] * 5),
+    r"state\.list\.element has BOOLEAN, no numbers": lambda root: rewrite(root, STATE, [[True] * 3] * 5),
+    r"\.parquet is a pointer of Git LFS, .*; git lfs pull gets": lambda root: last(root).write_text(POINTER),
+}
 
 
 @pytest.mark.parametrize(
     ("joints", "harm", "message"),
     [
-        ("x", None, r"x is an entry of several features; write action\[1\] or observation\.place\[0\]"),
-        ("lft.pos", None, r"has no feature lft\.pos; did you mean lift\.pos"),
-        (f"{STATE}[2:4]", None, r"there is no observation\.state\[2:4\]: observation\.state has 3 entries"),
-        (f"{STATE}[3]", None, r"there is no observation\.state\[3\]"),
-        (f"{STATE}[2:2]", None, r"there is no observation\.state\[2:2\]"),
-        (
-            "pan.pos",
-            lambda root: name_entries(root, "pan.pos", "pan.pos", "grip"),
-            "has two entries pan.pos; write .*",
-        ),
-        (STATE, lambda root: name_entries(root, "pan.pos", "lift.pos"), "has 3 entries, but names of 2: pan.pos, lift"),
-        (
-            STATE,
-            lambda root: change(root, codebase_version="v2.0"),
-            r"has format v2\.0, v2\.1 and v3 can be read; lerobot",
-        ),
-        (
-            STATE,
-            lambda root: (root / "meta").rename(root / "meta_data"),
-            r"is no LeRobot .*: it has no meta/info\.json",
-        ),
-        (
-            STATE,
-            lambda root: change(root, features={"action": None}),
-            r"no feature observation\.state; .* It has action",
-        ),
-        (STATE, lambda root: change(root, total_episodes=4), "says 4 episodes, but 3 were found; is a file missing"),
-        (STATE, lambda root: last(root).unlink(), "says 15 frames, but 10 were found"),
-        (STATE, lambda root: (root / "meta/info.json").write_text("{"), r"info\.json is no json"),
-        (STATE, lambda root: (root / "meta/info.json").write_text("[]"), r"info\.json must hold an object"),
-        (STATE, lambda root: [file.unlink() for file in last(root).parent.iterdir()], "were only its videos copied"),
-        (STATE, lambda root: last(root).write_bytes(b"PAR1 of another kind"), r"\.parquet cannot be read"),
-        (
-            STATE,
-            lambda root: rewrite(root, "timestamp", ["late"] * 5),
-            r"be read: timestamp has BYTE_ARRAY, no numbers",
-        ),
-        (STATE, lambda root: rewrite(root, "timestamp", [0.0, None, 2, 3, 4]), r"row \d+: timestamp must be finite"),
-        (STATE, lambda root: rewrite(root, STATE, [[[0.0, 1.0], [1.0]]] * 5), "cannot be read: setting an array"),
-        (STATE, empty, r"cannot be read: it would take \d+ bytes"),
-        (STATE, lambda root: rewrite(root, STATE, [[True] * 3] * 5), r"state\.list\.element has BOOLEAN, no numbers"),
-        (
-            STATE,
-            lambda root: last(root).write_text(POINTER),
-            r"\.parquet is a pointer of Git LFS, .*; git lfs pull gets",
-        ),
+        *((joints, None, message) for joints, message in UNKNOWN.items()),
+        *((STATE, harm, message) for message, harm in HARMS.items()),
+        ("pan.pos", lambda root: name_entries(root, "pan.pos", "pan.pos", "grip"), "has two entries pan.pos; write .*"),
     ],
 )
 def test_a_dataset_that_is_damaged_or_of_another_kind_is_refused(dataset, capsys, joints, harm, message):

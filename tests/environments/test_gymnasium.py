@@ -149,11 +149,6 @@ def test_a_start_that_is_seen_and_not_set_is_a_context(world, noise):
         robot.execute(np.zeros(2), still, stream(0, "any"))
 
 
-def test_the_noise_of_resets_is_measured():
-    found = measured_noise(sled(), stream(0, "any"), movements=200)
-    assert found == pytest.approx(0.1 / np.sqrt(3), rel=0.1)  # the uniform start is the only noise
-
-
 @pytest.mark.parametrize("arm", [PlanarArm(3), PlanarArm(noise=0.02, context=True)], ids=["arm", "contexts and noise"])
 @pytest.mark.filterwarnings(
     "ignore:.*Box observation space m.*imum value is.*infinity", "ignore:.*Not able to test alternative render modes"

@@ -29,13 +29,6 @@ def test_the_knots_are_blended_by_the_gaussians_of_equation_5() -> None:
     assert trajectory.ravel() == pytest.approx([6561 / 26488, 81 / 136, 27 / 136])
 
 
-def test_a_movement_starts_near_its_first_knot_and_not_its_last() -> None:
-    # The paper's printed sign, exp(+ sigma |.|^2), would play it backwards.
-    _, trajectory = unit_joint(9.0).trajectory(np.array([0.0, 0.0, 0.0, 1.0, 0.0]))
-    assert trajectory[0, 0] < 0.01
-    assert trajectory[-1, 0] > 0.7
-
-
 def test_a_longer_movement_is_the_same_movement_played_slower() -> None:
     short, long = stream(0, "theta").random(9), stream(0, "theta").random(9)
     short[-1], long[-1] = 0.0, 1.0

@@ -3,8 +3,11 @@
 import pytest
 
 import claimed
+import robots
+from changing import ARM, SIMULATOR
 from evidence import Evidence, NotRun
 from judging import judge
+from made_lives import write_lives
 from made_up import MOVEMENTS, SEEDS, lettered, row, write, write_rows
 from variants import FOUR
 
@@ -12,6 +15,8 @@ PAGES = {
     "paper": lambda found: claimed.paper(found, letter=False),
     "letter": lambda found: claimed.paper(found, letter=True),
     **{name: getattr(claimed, name) for name in ("learning", "curiosity", "model", "asking")},
+    "any_robot": robots.any_robot,
+    "changes": robots.changes,
 }
 
 
@@ -95,9 +100,34 @@ CASES = [
 ]
 
 
+ROBOTS = {
+    ("any_robot", 0): lambda number, *key: 4 if key == ("practice", 100) and number < 15 else 1,
+    ("any_robot", 1): lambda number, *key: 1.2 if key == ("practice", 1000) else 1,
+    ("any_robot", 2): lambda number, *key: 0.3 if key == ("sagg-riac", 50) else 1,
+    ("any_robot", 3): lambda number, *key: 0.3 if key == ("uniform-nearest", 50) else 1,
+    ("any_robot", 4): lambda number, *key: 0.3 if key == ("practice-interest", 50) else 1,
+    ("any_robot", 5): lambda number, *key: 0.3 if key == ("practice-middle", 50) else 1,
+    ("changes", 0): lambda *key: 1.5 if key == ("fishing-rod", "undone", "goes-on", 250) else 1,
+    ("changes", 1): lambda *key: 3 if key == ("toss", "gradual", "goes-on", 500) else 1,
+    ("changes", 2): lambda *key: 3 if key == ("crawler", "stuck", "goes-on", 1000) else 1,
+    ("changes", 3): lambda *key: 3 if key == ("crawler", "undone", "goes-on", 1000) else 1,
+    ("changes", 4): lambda *key: 3 if key == ("planar-arm-7", "mirrored", "goes-on", 100) else 1,
+    ("changes", 5): lambda *key: 0.3 if key == ("toss", "noise", "blind", 100) else 1,
+    ("changes", 6): lambda *key: 1.5 if key == (ARM, SIMULATOR, "goes-on", 50) else 1,
+    ("changes", 7): lambda *key: 3 if key == (ARM, SIMULATOR, "goes-on", 1000) else 1,
+    ("changes", 8): lambda *key: 3 if key == (ARM, SIMULATOR, "wrong", 1000) else 1,
+}
+CASES += [(page, claim, {"robots": change}) for (page, claim), change in ROBOTS.items()]
+
+
+def evidence(folder, *, robots=None, **change):
+    """Made-up rows that are spoilt: those about robots, or all others."""
+    return Evidence.of(write_lives(folder, robots) if robots else write_rows(folder, **change))
+
+
 @pytest.fixture(scope="module")
 def true_rows(tmp_path_factory):
-    return Evidence.of(write_rows(tmp_path_factory.mktemp("rows")))
+    return Evidence.of(write_lives(write_rows(tmp_path_factory.mktemp("rows"))))
 
 
 @pytest.mark.parametrize("page", PAGES)
@@ -107,7 +137,7 @@ def test_where_every_bar_is_cleared_every_claim_holds(true_rows, page):
 
 @pytest.mark.parametrize(("page", "claim", "change"), CASES)
 def test_a_claim_that_the_rows_contradict_fails(tmp_path, page, claim, change):
-    found = Evidence.of(write_rows(tmp_path, **change))
+    found = evidence(tmp_path, **change)
     (verdict,) = judge([PAGES[page](found)[claim]])
     assert verdict.verdict == "fails", verdict
 

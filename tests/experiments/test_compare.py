@@ -10,8 +10,10 @@ import pytest
 from compare import KEY, collect, compared, last_rows, main, runs_of
 from made_up import row
 from runs import ROOT, start
+from sgimd_torch import run, sgim_d_letter
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.evaluation import Benchmark
+from sgimd_torch.options.build import build
 from sgimd_torch.options.command_line import parse
 from sgimd_torch.options.config import Config, words
 from sgimd_torch.record import RunError
@@ -176,6 +178,47 @@ def test_a_run_is_evaluated_by_its_own_inverse_and_by_the_one_that_answers_for_a
     assert wanted["uniform-nearest.toss"].evaluated_by == ("own", "process")
     assert wanted["sgim-d"].evaluated_by == ("own",)
     assert last_rows(wanted["sgim-d-letter"]) == {("sgim-d-letter", 0, 5000, answer) for answer in ("paper", "process")}
+
+
+LETTER = (  # spelled out
+    "inverse=paper goals.progress=absolute goals.g_max=50 goals.max_aspect=1e9 search.noise=0 search.complete=true "
+    "search.xatol=1e-4 search.fatol=1e-4 budget=60 give_up=-1 global_range=0,1"
+)
+BOUNDS = {"global_range": (0.05, 0.95), "social.exact_first": True}
+
+
+def arm_life(algorithm, learner_of=None, **options):
+    """Movements of an arm."""
+    arm = {"environment": "planar-arm-7", "teacher.every": 20, "seed": 3}
+    parts = build(Config.from_settings({"algorithm": algorithm, **arm, **options}))
+    learner = learner_of(parts.environment) if learner_of else parts.learner
+    episodes = run(learner, parts.environment, 3, movements=60, teacher=parts.teacher)
+    return np.stack([episode.move.theta for episode in episodes])
+
+
+def test_the_letter_is_one_word_for_twelve_options():
+    spelled = dict(option.split("=") for option in LETTER.split())
+    letter, varied = Config("sagg-riac-letter").values, {"social.exact_first": "false"}
+    assert letter == Config.from_settings({"algorithm": "sagg-riac", **spelled}).values | {
+        "algorithm": letter["algorithm"]
+    }
+    life = arm_life("sgim-d-letter")
+    assert np.array_equal(life, arm_life("sgim-d", **spelled, **varied))
+    in_python = arm_life("sgim-d-letter", lambda arm: sgim_d_letter(arm, 3, correspondence=arm.correspondence))
+    assert np.array_equal(life, in_python)
+    bounded = arm_life("sgim-d-letter", **BOUNDS)
+    assert np.array_equal(bounded, arm_life("sgim-d", **{**spelled, **BOUNDS}))
+    assert not np.array_equal(bounded, life)
+
+
+def test_rows_of_the_letter_are_the_algorithm_with_two_bounds(go, tmp_path):
+    (config,) = runs_of(["letter"], ["sgim-d-letter"], [3], tmp_path)
+    assert (config.algorithm, dict(config.parts)) == ("sgim-d-letter", BOUNDS)
+    options = ("--algorithm", "sgim-d-letter", "--global-range", "0.05,0.95", "--social.exact-first", "true")
+    arm = ("--environment", "planar-arm-7", "--teacher.every", 20, "--movements", 60, "--evaluate-at", "[]")
+    assert go(tmp_path, *options, *arm, "--benchmark", "null") == 0
+    lived = read_run(tmp_path / "sgim-d-letter" / "seed-003").thetas
+    assert np.array_equal(lived, arm_life("sgim-d-letter", **BOUNDS))
 
 
 def test_a_corner_is_twenty_neighbours_and_many_are_the_first(tmp_path):

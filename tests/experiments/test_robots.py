@@ -6,17 +6,14 @@ import numpy as np
 import pytest
 
 import robots
-from changing import ARM, GRADUAL, SIMULATOR, UNDONE, Changing, errors
+from changing import GRADUAL, UNDONE, Changing, errors
 from evidence import Evidence, NotRun
-from judging import judge
 from lives import make_lives
 from made_lives import ALIVE, life, write_lives
 from random_robots import FAMILIES, LEARNERS, RandomRobot, kind
 from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.environments.planar_arm import PlanarArm
 from table import merge, read_table
-
-CLAIMS = {"any_robot": robots.any_robot, "changes": robots.changes}
 
 
 def moved(change, since, theta):
@@ -97,37 +94,6 @@ def test_the_learner_of_before_is_compared_with_the_one_that_starts_anew(tmp_pat
     assert robots.over_anew(found, "toss", "gain", 250, level=None).value == pytest.approx(0.4)
     with pytest.raises(NotRun, match="goes-on after gain of fishing-rod at 1000"):
         robots.over_anew(found, "fishing-rod", "gain", 1000)
-
-
-@pytest.mark.parametrize("page", CLAIMS)
-def test_where_every_bar_is_cleared_every_claim_holds(tmp_path, page):
-    verdicts = judge(CLAIMS[page](found_in(tmp_path)))
-    assert {each.claim: each.verdict for each in verdicts if each.verdict != "holds"} == {}
-
-
-@pytest.mark.parametrize(
-    ("page", "claim", "spoilt"),
-    [
-        ("any_robot", 0, lambda number, *key: 4 if key == ("practice", 100) and number < 15 else 1),
-        ("any_robot", 1, lambda number, *key: 1.2 if key == ("practice", 1000) else 1),
-        ("any_robot", 2, lambda number, *key: 0.3 if key == ("sagg-riac", 50) else 1),
-        ("any_robot", 3, lambda number, *key: 0.3 if key == ("uniform-nearest", 50) else 1),
-        ("any_robot", 4, lambda number, *key: 0.3 if key == ("practice-interest", 50) else 1),
-        ("any_robot", 5, lambda number, *key: 0.3 if key == ("practice-middle", 50) else 1),
-        ("changes", 0, lambda *key: 1.5 if key == ("fishing-rod", "undone", "goes-on", 250) else 1),
-        ("changes", 1, lambda *key: 3 if key == ("toss", "gradual", "goes-on", 500) else 1),
-        ("changes", 2, lambda *key: 3 if key == ("crawler", "stuck", "goes-on", 1000) else 1),
-        ("changes", 3, lambda *key: 3 if key == ("crawler", "undone", "goes-on", 1000) else 1),
-        ("changes", 4, lambda *key: 3 if key == ("planar-arm-7", "mirrored", "goes-on", 100) else 1),
-        ("changes", 5, lambda *key: 0.3 if key == ("toss", "noise", "blind", 100) else 1),
-        ("changes", 6, lambda *key: 1.5 if key == (ARM, SIMULATOR, "goes-on", 50) else 1),
-        ("changes", 7, lambda *key: 3 if key == (ARM, SIMULATOR, "goes-on", 1000) else 1),
-        ("changes", 8, lambda *key: 3 if key == (ARM, SIMULATOR, "wrong", 1000) else 1),
-    ],
-)
-def test_a_claim_that_the_rows_contradict_fails(tmp_path, page, claim, spoilt):
-    (verdict,) = judge([CLAIMS[page](found_in(tmp_path, spoilt))[claim]])
-    assert verdict.verdict == "fails", verdict
 
 
 def test_lives_that_the_table_has_are_not_made_again_and_the_others_get_their_rows(tmp_path):

@@ -9,23 +9,9 @@ from sgimd_torch.environments.from_gymnasium import measured_noise
 from sgimd_torch.runs.tasks import benchmark_of
 from sgimd_torch.runs.tasks.taught import demonstrations_of
 from sgimd_torch.spaces import stream
-from swimmer import Swimmer
-from swimmer import swimmer as swimmer_task
+from swimmer import Swimmer, swimmer
 
 NO_CONTEXT = np.zeros(0)
-
-
-@pytest.fixture(scope="module")
-def swimmer():
-    return Swimmer()
-
-
-def test_the_swimmer_keeps_every_promise(swimmer):
-    check_environment(swimmer)
-
-
-def test_the_noise_of_the_swimmer_is_as_announced(swimmer):
-    assert measured_noise(swimmer, stream(1001, "noise")) == pytest.approx(swimmer.outcome_noise, rel=0.25)
 
 
 def test_a_wave_along_its_body_moves_the_swimmer_and_the_opposite_one_moves_it_back():
@@ -37,8 +23,12 @@ def test_a_wave_along_its_body_moves_the_swimmer_and_the_opposite_one_moves_it_b
     assert np.linalg.norm(still.execute(NO_CONTEXT, [0, 0, 0.5, 0, 0, 0.5, 0.5], stream(0, "any"))) < 1e-9
 
 
-def test_the_swimmer_is_a_task_with_goals_and_demonstrations():
-    task = swimmer_task()
+def test_the_swimmer_is_a_task_that_keeps_every_promise_with_goals_and_demonstrations():
+    task = swimmer()
+    check_environment(task.environment)
+    assert measured_noise(task.environment, stream(1001, "noise")) == pytest.approx(
+        task.environment.outcome_noise, rel=0.25
+    )
     benchmark, _, _ = benchmark_of(task, None)
     assert len(benchmark.goals) > 100
     demonstrations, _, _ = demonstrations_of(task, None)

@@ -109,22 +109,23 @@ def slides(lies):
     return (1.5 * 0.54 * 6 * time * (1 - time) / 0.5) ** 2 / (2 * 0.3 * GRAVITY)
 
 
-def test_a_push_sends_the_puck_straight_ahead_as_far_as_friction_lets_it():
-    assert puck().environment.effect(AHEAD, PUSH) == pytest.approx(
-        [0.5 + slides(0.5), 0], abs=0.02
-    )  # 50 straight steps in a swing
+@pytest.mark.parametrize(
+    ("lies", "theta", "ends"),
+    [
+        (0.5, PUSH, 0.5 + slides(0.5)),
+        (0.6, PUSH, 2 * 1.2 - 0.6 - slides(0.6)),  # the wall at 1.2 m reflects it without loss
+        (0.5, np.array([0.5, 0.3, 0.5, 1.0, 1.0]), 0.5),  # lowered onto it, .48 m ahead, the hand holds it
+    ],
+    ids=["free", "wall", "held"],
+)
+def test_a_puck_ends_straight_ahead_where_friction_wall_and_hand_let_it(lies, theta, ends):
+    end = puck().environment.effect(np.array([lies, 0.0]), theta)
+    assert end == pytest.approx([ends, 0], abs=0.02)  # 50 straight steps in a swing
 
 
 def test_a_swing_three_times_slower_sends_the_puck_a_ninth_as_far():
     far, near = (puck().environment.effect(AHEAD, theta) - AHEAD for theta in (PUSH, PUSH * [1, 1, 1, 1, 0]))
     assert far == pytest.approx(9 * near)
-
-
-def test_a_wall_reflects_the_puck_without_loss():
-    assert 0.6 + slides(0.6) > 1.3  # the wall is at 1.2 m
-    assert puck().environment.effect(np.array([0.6, 0.0]), PUSH) == pytest.approx(
-        [2 * 1.2 - 0.6 - slides(0.6), 0], abs=0.02
-    )
 
 
 def test_a_mirrored_swing_at_a_mirrored_puck_ends_mirrored():
@@ -134,11 +135,6 @@ def test_a_mirrored_swing_at_a_mirrored_puck_ends_mirrored():
     ends = robot.effect(contexts, thetas)
     assert (ends != contexts).any()
     assert robot.effect(contexts * [1, -1], mirrored) == pytest.approx(ends * [1, -1])
-
-
-def test_a_hand_that_is_lowered_onto_the_puck_holds_it():
-    onto = np.array([0.5, 0.3, 0.5, 1.0, 1.0])  # .48 m ahead
-    assert (puck().environment.effect(AHEAD, onto) == AHEAD).all()
 
 
 def test_the_ball_goes_where_the_hand_opens_if_it_was_grasped():

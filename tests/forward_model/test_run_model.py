@@ -22,7 +22,7 @@ from sgimd_torch.options.build import build
 from sgimd_torch.options.command_line import main
 from sgimd_torch.options.config import Config
 from sgimd_torch.record import Record, ReplayError, layout
-from sgimd_torch.runs.directory import FILE
+from sgimd_torch.runs.directory import RUN_FILE
 from sgimd_torch.runs.load import load_learner
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.run import Seconds
@@ -58,7 +58,7 @@ def reference(tmp_path_factory, live):
 
 def table(directory, name):
     """The names of the columns of a table, and its rows."""
-    with Record(directory / FILE) as record:
+    with Record(directory / RUN_FILE) as record:
         columns = [column.split()[0] for column in layout(record.dims)[name][:-1]]
         return columns, np.array(list(record.rows(name)), dtype=np.float64)
 
@@ -192,7 +192,7 @@ def test_a_model_that_was_never_used_is_reported(tmp_path, live, capsys, options
 @pytest.fixture
 def listen(tmp_path):
     """Function that gives a listener ``n`` movements of an arm; ``before(index, model)`` comes before each of them."""
-    with Record.make(tmp_path / FILE, (0, 7, 2), {}) as record:
+    with Record.make(tmp_path / RUN_FILE, (0, 7, 2), {}) as record:
 
         def listen(n, before=lambda index, model: None):
             model, memory, arm = ForwardModel(0, 7, 2, rate=1.0), Memory(0, 7, 2), PlanarArm(7)

@@ -62,6 +62,19 @@ def test_the_three_modes_share_the_goals_7_to_2_to_1_and_the_first_and_last_foll
     assert chi_square(np.bincount(is_near[in_last], minlength=2), [1 - probability, probability]) < 10.8  # 1 in 1000
 
 
+def test_each_mode_alone_draws_its_own_goals():
+    first, anywhere, worst = (
+        np.array([goals.sample(NO_CONTEXT)[0] for _ in range(200)])
+        for goals in (four_regions_of_interest_1_2_3_4(modes=modes, near=0.01) for modes in np.eye(3).tolist())
+    )
+    regions = four_regions_of_interest_1_2_3_4().regions
+    least, last = regions[0].high[0], regions[-1]
+    assert min(first.min(), worst.min()) >= least  # eq. (4): the region of least interest is never chosen
+    assert (anywhere < least).sum() > 20  # a quarter of T; 50 expected, five standard deviations above 20
+    near = np.abs(worst[worst >= last.low[0], None] - last.goals[last.competences == -1][:, 0]).min(axis=1)
+    assert near.max() <= 0.01 * (last.high[0] - last.low[0])
+
+
 def test_goals_are_uniform_in_every_context_while_all_interests_are_equal():
     goals = InterestMap(problem(contexts=LINE, outcomes=LINE, seed=3), near=1.0)  # a whole region is near its worst
     for context, goal in stream(3, "planted").uniform(size=(400, 2)) ** [2, 3]:
@@ -166,6 +179,8 @@ def test_a_small_part_of_great_progress_does_not_outweigh_a_balanced_cut():
     axis, cut = cut_of(points, competences)
     assert axis == 0
     assert 0.3 < cut < 0.6
+    # The paper's rule: the greatest difference of interests, .5 - .2 and less elsewhere, below the fifth place.
+    assert cut_of(points, competences, balanced=False) == (0, pytest.approx(2 / 21))
 
 
 def test_without_any_difference_a_region_is_halved_across_its_longest_side():

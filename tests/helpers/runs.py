@@ -11,7 +11,7 @@ from pathlib import Path
 
 import sgimd_torch
 from sgimd_torch.record import Record, layout
-from sgimd_torch.runs.directory import FILE
+from sgimd_torch.runs.directory import RUN_FILE
 
 ROOT = Path(sgimd_torch.__file__).parents[1]
 MOVEMENTS = 90
@@ -37,19 +37,19 @@ def arguments(out, benchmark):
 
 def content_of(directory):
     """The rows of all tables except ``about``, which differs from run to run."""
-    with Record(directory / FILE) as record:
+    with Record(directory / RUN_FILE) as record:
         return {table: list(record.rows(table)) for table in layout(record.dims) if table != "about"}
 
 
 def about_of(directory):
     """The table ``about`` of a run: its settings, versions and times."""
-    with Record(directory / FILE) as record:
+    with Record(directory / RUN_FILE) as record:
         return record.about
 
 
 def write_about(directory, **about):
     """Replace entries of the table ``about`` of a run."""
-    with Record(directory / FILE, write=True) as record:
+    with Record(directory / RUN_FILE, write=True) as record:
         record.about |= about
         record.commit()
 

@@ -7,6 +7,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 from sgimd_torch.algorithms.paper import imitation, observation, random_exploration, sagg_riac, sgim_d
 from sgimd_torch.environments.planar_arm import PlanarArm
@@ -65,6 +66,24 @@ def problem(
         made = made.over(memory)
         made.inverse = inverse(made)
     return made
+
+
+class ArmThat(PlanarArm):
+    """An arm of five joints that calls ``act`` before each movement, with the number of the call and the stream.
+
+    What ``act`` returns, if anything, takes the place of the outcome.
+    """
+
+    execute_many = None
+
+    def __init__(self, act: Callable[[int, np.random.Generator], object], **options: Any) -> None:
+        super().__init__(5, **options)
+        self.act, self.calls = act, 0
+
+    def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Any:
+        self.calls += 1
+        instead = self.act(self.calls - 1, rng)
+        return super().execute(context, theta, rng) if instead is None else instead
 
 
 def last_posture(times: Array, trajectory: Array) -> Array:

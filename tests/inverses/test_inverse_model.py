@@ -67,6 +67,9 @@ def test_a_reproducible_movement_farther_away_beats_an_erratic_one_on_the_goal()
     goal = np.array([0.0])
     assert LocalInverse(given, alpha=0.5)(NO_CONTEXT, goal).theta[0] == pytest.approx(0.905)
     assert LocalInverse(given, alpha=0.4)(NO_CONTEXT, goal).theta[0] < 0.11  # 0.11 against 0.12
+    # The paper's variance of the erratic pair, 0.4**2 / 2 = 0.08: so 0 + 0.04 against 0.12.
+    assert LocalInverse(given, alpha=0.5, variance=True)(NO_CONTEXT, goal).theta[0] < 0.11
+    assert LocalInverse(given, alpha=1.6, variance=True)(NO_CONTEXT, goal).theta[0] == pytest.approx(0.905)  # 0.128
 
 
 def test_a_movement_without_neighbours_is_trusted_as_the_median_of_the_others() -> None:

@@ -1,5 +1,6 @@
 """A movement may fail: it is counted and recorded, nothing is remembered of it, and the learner goes on."""
 
+from collections.abc import Callable
 from itertools import count, pairwise
 from pathlib import Path
 
@@ -18,26 +19,19 @@ from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.signals import command
 from sgimd_torch.session import NoOutcomeError, run
 from sgimd_torch.spaces import Array, Episode, stream
+from worlds import ArmThat
 
-DIMS = 0, 5, 2
 
-
-class FailingArm(PlanarArm):
+def failing(fails: Callable[[int], object]) -> ArmThat:
     """``fails(n)`` is what its n-th call gives in the place of an outcome, or raises; None: it moves."""
 
-    def __init__(self, fails, noise: float = 0.01) -> None:
-        super().__init__(5, noise=noise)
-        self.fails, self.calls, self.draws = fails, 0, list[float]()
-
-    def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
-        self.calls += 1
-        self.draws.append(stream(0, "environment", self.calls - 1).random() - rng.random())
-        failure = self.fails(self.calls - 1)
+    def act(n: int, rng: np.random.Generator) -> object:
+        failure = fails(n)
         if isinstance(failure, BaseException):
             raise failure
-        return super().execute(context, theta, rng) if failure is None else failure
+        return failure
 
-    execute_many = None
+    return ArmThat(act, noise=0.01)
 
 
 def every_fifth(failure: object):
@@ -57,7 +51,9 @@ FAILURES = {
 
 @pytest.mark.parametrize("reason", FAILURES)
 def test_a_movement_that_fails_counts_and_is_forgotten(reason: str) -> None:
-    arm = FailingArm(every_fifth(FAILURES[reason]))
+    arm, drawn = failing(every_fifth(FAILURES[reason])), list[float]()
+    fail = arm.act
+    arm.act = lambda n, rng: drawn.append(rng.random()) or fail(n, rng)
     learner = practice(arm, 0)
     episodes = list(run(learner, arm, 0, movements=50))
     failed = [episode for episode in episodes if episode.failed]
@@ -66,11 +62,11 @@ def test_a_movement_that_fails_counts_and_is_forgotten(reason: str) -> None:
     assert all(reason in episode.failed for episode in failed)
     assert len(learner.memory) == 40
     assert learner.movements == 50
-    assert arm.draws == [0.0] * 50  # each movement, failed or not, has the stream of its number
+    assert drawn == [stream(0, "environment", k).random() for k in range(50)]  # failed or not, each has its own
 
 
 def test_the_attempt_of_a_failed_movement_is_over() -> None:
-    arm = FailingArm(every_fifth(ConnectionError()))
+    arm = failing(every_fifth(ConnectionError()))
     learner = sgim_d(arm, 0, correspondence=arm.correspondence, budget=1000, give_up=-1.0, tolerance=0.0)
     episodes = list(run(learner, arm, 0, movements=60))
     for before, after in pairwise(episodes):
@@ -81,7 +77,7 @@ def test_the_attempt_of_a_failed_movement_is_over() -> None:
 
 
 def test_what_cannot_be_observed_fails_before_the_learner_proposes_anything() -> None:
-    arm = FailingArm(lambda n: None)
+    arm = failing(lambda n: None)
     observe, asked = arm.observe, []
 
     def sometimes(rng: np.random.Generator) -> Array:
@@ -99,7 +95,7 @@ def test_what_cannot_be_observed_fails_before_the_learner_proposes_anything() ->
 
 
 def test_a_robot_without_contexts_observes_with_the_stream_of_its_movement() -> None:
-    arm = FailingArm(lambda n: None)
+    arm = failing(lambda n: None)
 
     def sometimes(rng: np.random.Generator) -> Array:
         if rng.random() < 0.3:
@@ -113,7 +109,7 @@ def test_a_robot_without_contexts_observes_with_the_stream_of_its_movement() -> 
 
 
 def test_too_many_failures_in_a_row_end_a_run_which_can_go_on() -> None:
-    arm = FailingArm(lambda n: ConnectionError("unplugged") if n in (1, 2) or 5 <= n < 8 else None)
+    arm = failing(lambda n: ConnectionError("unplugged") if n in (1, 2) or 5 <= n < 8 else None)
     learner = practice(arm, 0)
     episodes: list[Episode] = []
     with pytest.raises(NoOutcomeError, match="3 movements in a row failed, the last one: ConnectionError: unplugged"):
@@ -153,26 +149,19 @@ def test_a_failed_answer_misses_its_goal_as_if_the_robot_had_not_moved(together:
 
 
 MODULE = """
-import os
 from pathlib import Path
 import numpy as np
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.runs.tasks import Task
-class Lossy(PlanarArm):
+class Broken(PlanarArm):
     execute_many = None
     def execute(self, context, theta, rng):
-        outcome = super().execute(context, theta, rng)
-        if rng.random() < .2:
-            raise ConnectionError("lost")
-        return outcome
-class Broken(Lossy):
-    def execute(self, context, theta, rng):
         if Path("repaired").exists():
-            return PlanarArm.execute(self, context, theta, rng)
+            return super().execute(context, theta, rng)
         raise SystemExit(0)
 class Worse(PlanarArm):
-    n = 0
+    n, execute_many = 0, None
     def execute(self, context, theta, rng):
         self.n += 1
         if self.n == 11:
@@ -183,7 +172,6 @@ class Worse(PlanarArm):
 def task(kind):
     goals = np.random.default_rng(0).uniform(-.5, .5, (20, 2))
     return Task(kind(5, noise=.01), lambda: Benchmark(kind.__name__, goals, .1))
-def lossy(): return task(Lossy)
 def broken(): return task(Broken)
 def worse(): return task(Worse)
 """
@@ -199,13 +187,6 @@ def words(name: str, *more: str) -> list[str]:
     return ["--environment", f"lossy_robots:{name}", *fixed, "--out", name, *more]
 
 
-def test_failed_movements_are_counted_in_the_run_and_in_its_evaluations(robots: Path, capsys) -> None:
-    assert command(main, words("lossy")) == 0
-    assert "movements of the evaluation failed" in capsys.readouterr().out
-    run_ = read_run(robots / "lossy" / "practice" / "seed-003")
-    assert run_.summary["failed"] == (np.isnan(run_.outcomes) & np.isfinite(run_.thetas[:, :2])).all(axis=1).sum() > 5
-
-
 def test_a_run_whose_robot_is_broken_says_how_to_go_on_and_does(robots: Path, capsys) -> None:
     assert command(main, words("broken")) == 1
     errors = capsys.readouterr().err
@@ -217,9 +198,12 @@ def test_a_run_whose_robot_is_broken_says_how_to_go_on_and_does(robots: Path, ca
     assert read_run(robots / "broken" / "practice" / "seed-003").summary["failed"] == 10
 
 
-def test_three_failures_are_told_and_later_ones_only_counted(robots: Path, capsys) -> None:
-    assert command(main, words("worse", "--evaluate-at", "[]", "--movements", "20")) == 0
-    told = [line for line in capsys.readouterr().err.splitlines() if "movement " in line]
+def test_three_failures_are_told_and_later_ones_only_counted_also_in_evaluations(robots: Path, capsys) -> None:
+    assert command(main, words("worse", "--evaluate-at", "20", "--movements", "20")) == 0
+    printed = capsys.readouterr()
+    assert "movements of the evaluation failed" in printed.out
+    assert read_run(robots / "worse" / "practice" / "seed-003").summary["failed"] == 11
+    told = [line for line in printed.err.splitlines() if "movement " in line]
     numbers = ("1 failed: ConnectionError: lost packet 2", "3", "5")
     assert len(told) == 3
     assert all(f"movement {each}" in line for line, each in zip(told, numbers, strict=True))

@@ -12,7 +12,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule, run_state_machine_as_test
 
-from runs import edit
+from records import read
 from sgimd_torch import session
 from sgimd_torch.algorithms.paper import observation, random_exploration, sagg_riac, sgim_d
 from sgimd_torch.algorithms.practice import practice, practice_taught
@@ -22,16 +22,11 @@ from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.learner.events import Kind
 from sgimd_torch.memory import Memory
-from sgimd_torch.options.build import build
-from sgimd_torch.options.command_line import main
 from sgimd_torch.record import Record, ReplayError, RunError
 from sgimd_torch.record.saving import load_life, save_life
 from sgimd_torch.rivals.alp_gmm import AlpGmm
 from sgimd_torch.rivals.cma_es import CmaEs
 from sgimd_torch.rivals.quality_diversity import cma_me, map_elites
-from sgimd_torch.runs.directory import FILE
-from sgimd_torch.runs.read import config_of, read_run
-from sgimd_torch.runs.signals import command
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Demonstration, Failure, Move, stream
 from sgimd_torch.teach.by_hand import ByHand
@@ -79,11 +74,6 @@ TEACHERS = {
     "asked": lambda: AskedTeacher(LESSONS, stream(0, "teacher"), patience=2),
     "by hand": lambda: ByHand(teacher=PeriodicTeacher(LESSONS, stream(0, "teacher"), every=3)),
 }
-
-
-def rows(path):
-    with Record(path) as record:
-        return list(record.rows("events"))
 
 
 def seen(learner):
@@ -244,7 +234,7 @@ class Lives(RuleBasedStateMachine):
         self.record.close()
         for learner, name in ((self.whole, "whole"), (self.twin, "twin")):
             save_life(learner, self.path / name)
-        assert rows(self.path / "whole") == rows(self.path / "twin")
+        assert read(self.path / "whole")["events"] == read(self.path / "twin")["events"]
         with Record(self.path / "run.sqlite") as record, Record(self.path / "whole") as saved:
             for event, other in zip(record.events(), saved.events(), strict=True):
                 same = event._replace(goal=None, origin=None) if event.kind == Kind.MOVED else event
@@ -290,28 +280,6 @@ def test_a_rival_goes_on_in_the_middle_of_its_search(name, tmp_path):
     assert [line(episode) for episode in run(learner, QUIET, 1, movements=130)] == lines[77:]
 
 
-@pytest.mark.slow
-def test_a_search_through_a_model_goes_on_when_the_model_is_refreshed_as_the_loop_did(tmp_path):
-    from sgimd_torch.forward_model.search import GradientSearch  # torch takes time to load
-
-    def live(lines, path=None):
-        learner = sagg_riac(QUIET, 5, search=GradientSearch)
-        (shared,) = learner.problem.trained
-        if path is not None:
-            load_life(learner, path, after=lambda move: shared.refresh(learner.memory))
-        for episode in run(learner, QUIET, 5, movements=140):
-            lines.append(line(episode))
-            shared.refresh(learner.memory)
-            if episode.index == 99:
-                save_life(learner, tmp_path / "life.sqlite")
-        assert shared.model.trained
-
-    whole, rest = [], []
-    live(whole)
-    live(rest, tmp_path / "life.sqlite")
-    assert rest == whole[100:]
-
-
 @pytest.mark.parametrize("copied", [copy.deepcopy, copy.copy, pickle.dumps])
 def test_who_copies_a_learner_is_told_how_to_save_its_life(copied):
     with pytest.raises(TypeError, match=r"^a learner cannot be copied or pickled.*save_life.*load_life.*$"):
@@ -337,13 +305,11 @@ def teacher_of(seed=0, every=20):
 
 @pytest.fixture(scope="module")
 def saved(tmp_path_factory):
-    """A life of SGIM-D with 50 movements and 2 lessons, and the same with another theta in the file."""
+    """A life of SGIM-D with 50 movements and 2 lessons."""
     path, learner = tmp_path_factory.mktemp("saved") / "life.sqlite", taught()
     for _ in run(learner, QUIET, 6, movements=50, teacher=teacher_of()):
         pass
     save_life(learner, path)
-    path.with_name("damaged").write_bytes(path.read_bytes())
-    edit(path.with_name("damaged"), "UPDATE events SET theta_1 = 0.5 WHERE movement = 30")
     return path
 
 
@@ -390,14 +356,6 @@ def test_a_life_that_this_learner_cannot_repeat_is_refused(saved, message):
         load_life(learner(), saved, teacher=teacher[0]() if teacher else None)
 
 
-@pytest.mark.parametrize(
-    ("name", "message"), [("damaged", "row 32 of events is not what was written"), ("missing", "there is no record")]
-)
-def test_a_damaged_life_and_none_are_refused(saved, name, message):
-    with pytest.raises(RunError, match=message):
-        load_life(taught(), saved.with_name(name))
-
-
 def test_a_memory_that_was_written_to_from_outside_is_not_saved(tmp_path):
     learner = lived()
     learner.memory.add(NO_CONTEXT, np.full(4, 0.5), [0.0, 0.0])
@@ -417,24 +375,6 @@ def test_lessons_of_different_shape_are_saved(tmp_path):
         assert [lesson.trajectory.shape for lesson in record.demonstrations()] == [(5, 2), (7, 3)]
 
 
-@pytest.mark.parametrize(
-    ("algorithm", "more"), [("sgim-acts", ("--teachers", "low-half,high-half")), ("imitation", ())]
-)
-def test_the_file_of_a_run_is_loaded_by_a_learner_of_a_program_of_ones_own(tmp_path, algorithm, more):
-    words = f"--algorithm {algorithm} --environment planar-arm-7 --evaluate_at [] --seed 4 --name run".split()
-    for movements in (50, 70):
-        options = [*words, *more, "--movements", str(movements), "--out", str(tmp_path / str(movements))]
-        assert command(main, options) == 0
-    run_of_50, run_of_70 = (read_run(tmp_path / f"{movements}/run/seed-004") for movements in (50, 70))
-    parts = build(config_of(run_of_50))
-    load_life(parts.learner, run_of_50.path / FILE, teacher=parts.teacher)
-    more_movements = {"movements": 70, "teacher": parts.teacher, "teachers": parts.teachers}
-    episodes = list(run(parts.learner, parts.environment, 4, **more_movements))
-    assert [episode.move and episode.move.theta.tolist() for episode in episodes] == [
-        None if np.isnan(theta).any() else theta.tolist() for theta in run_of_70.thetas[50:]
-    ]
-
-
 @pytest.mark.parametrize("build", [random_exploration, sagg_riac, map_elites, cma_me])
 def test_a_learner_starts_from_a_memory_and_leaves_it_as_it_was_and_so_does_the_one_that_loads(build, tmp_path):
     start = exemplars(30)
@@ -446,12 +386,6 @@ def test_a_learner_starts_from_a_memory_and_leaves_it_as_it_was_and_so_does_the_
     assert (len(start), len(learner.memory)) == (30, 55)
     assert np.array_equal(learner.memory.thetas[:30], start.thetas)
     assert np.array_equal(again.memory.thetas, learner.memory.thetas)
-
-
-def test_goal_babbling_from_a_memory_uses_it_at_its_first_movement():
-    starts = None, exemplars(200)
-    empty, full = (next(run(sagg_riac(QUIET, 0, memory=start), QUIET, 0, movements=1)) for start in starts)
-    assert (empty.move.origin, full.move.origin) == ("global", "local")
 
 
 def test_map_elites_from_a_memory_varies_its_elites_at_once():

@@ -1,8 +1,6 @@
 """The main loop: five learners, exact counts, independent streams, and replays that execute nothing."""
 
 from collections.abc import Sequence
-from functools import partial
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -17,23 +15,10 @@ from sgimd_torch.record import Record
 from sgimd_torch.record.saving import load_life, save_life
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Array, Episode, stream
-from sgimd_torch.strategies import Imitate
 from sgimd_torch.teachers import InitialTeacher, PeriodicTeacher
-from worlds import ALGORITHMS, TAUGHT, demonstrations, last_posture, make
+from worlds import ALGORITHMS, TAUGHT, ArmThat, demonstrations, last_posture, make
 
 every_algorithm = pytest.mark.parametrize("name", ALGORITHMS)
-
-
-class CountingArm(PlanarArm):
-    """Counts its movements, and what it has been asked."""
-
-    def __init__(self, **options: object) -> None:
-        super().__init__(5, **options)
-        self.executed: list[tuple[Array, Array]] = []
-
-    def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
-        self.executed.append((np.asarray(context), np.asarray(theta)))
-        return super().execute(context, theta, rng)
 
 
 def teacher_of(arm: PlanarArm, every: int = 30) -> PeriodicTeacher:
@@ -69,16 +54,6 @@ def test_a_run_has_exactly_as_many_movements_as_asked_for(name: str) -> None:
         assert np.array_equal(learner.memory.outcomes, executed)
 
 
-def test_sgim_d_imitates_exactly_first_and_then_returns_to_its_own_goals() -> None:
-    arm = PlanarArm(5)
-    learner = sgim_d(arm, 0, correspondence=last_posture, social=partial(Imitate, repeats=7))
-    episodes = list(run(learner, arm, 0, movements=120, teacher=teacher_of(arm)))
-    for episode in episodes[30::30]:
-        assert np.array_equal(episode.move.theta, episode.demonstration.trajectory[-1])
-    imitated = [e.index for e in episodes if e.move.origin == "imitate"]
-    assert imitated == [*range(30, 37), *range(60, 67), *range(90, 97)]
-
-
 @every_algorithm
 def test_evaluating_does_not_disturb_learning(name: str) -> None:
     def watched(every: int | None) -> list[tuple[object, ...]]:
@@ -112,56 +87,25 @@ def recorded(path: Path, name: str, arm: PlanarArm, movements: int, seed: int = 
 
 @every_algorithm
 def test_a_run_resumed_from_its_record_executes_the_rest_alone(name: str, path: Path) -> None:
-    arm = CountingArm(noise=0.01)
+    arm = ArmThat(lambda n, rng: None, noise=0.01)
     recorded(path, name, arm, 37)
-    arm.executed.clear()
+    arm.calls = 0
     teacher_of(arm)
-    n_for_the_teacher = len(arm.executed) if name in TAUGHT else 0
-    arm.executed.clear()
+    n_for_the_teacher = arm.calls if name in TAUGHT else 0
+    arm.calls = 0
     resumed, whole = recorded(path, name, arm, 100), life(name, PlanarArm(5, noise=0.01), 100)
-    assert len(arm.executed) == n_for_the_teacher + sum(e.move is not None for e in whole[37:])
+    assert arm.calls == n_for_the_teacher + sum(e.move is not None for e in whole[37:])
     assert summary(resumed) == summary(whole)
 
 
-def test_a_movement_meets_the_same_noise_whatever_was_done_before_it() -> None:
-    def noises_met(name: str, every: int) -> dict[int, object]:
-        met: dict[int, object] = {}
-
-        class Listening(PlanarArm):
-            def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
-                met[len(met) + resting] = rng.bit_generator.state
-                return super().execute(context, theta, rng)
-
-        arm, quiet = Listening(5, noise=0.05), PlanarArm(5)
-        resting = every if name == "imitation" else 0
-        teacher = teacher_of(quiet, every) if name in TAUGHT else None
-        list(run(make(name, arm), arm, 0, movements=60, teacher=teacher))
-        return met
-
-    alone = noises_met("sagg-riac", 30)
-    assert len({str(state) for state in alone.values()}) == 60  # another one for each movement
-    assert noises_met("random", 30) == noises_met("sgim-d", 30) == noises_met("sgim-d", 7) == alone
-    assert noises_met("imitation", 20) == {index: alone[index] for index in range(20, 60)}
-
-
 @every_algorithm
-def test_a_context_holds_from_the_first_movement_of_an_attempt_to_its_last(name: str) -> None:
-    arm = PlanarArm(5, context=True)
-    lessons = demonstrations(PlanarArm(5))
-    in_context = [type(d)(np.array([0.3]), d.times, d.trajectory, d.outcome) for d in lessons]
-    teacher = PeriodicTeacher(in_context, stream(0, "teacher")) if name in TAUGHT else None
-    learner = make(name, arm)
-    episodes = list(run(learner, arm, 0, movements=150, teacher=teacher))
-    for before, after in pairwise(episodes):
-        if after.demonstration is None and before.move is not None and after.move is not None:
-            same_goal = after.move.goal is not None and np.array_equal(before.move.goal, after.move.goal)
-            assert np.array_equal(before.context, after.context) or not same_goal
-    answers = [e for e in episodes if e.demonstration is not None and e.move is not None]
-    assert all(e.context.tolist() == [0.3] for e in answers)
-    contexts = np.array([e.context for e in episodes if e.move is not None]).reshape(-1, 1)
-    if name != "observation":
-        assert np.array_equal(learner.memory.contexts, contexts)
-        assert len(np.unique(contexts)) > 1 or name == "imitation"
+def test_a_movement_has_the_noise_of_its_number_whatever_was_done_before_it(name: str) -> None:
+    drawn: list[float] = []
+    arm = ArmThat(lambda n, rng: drawn.append(rng.random()), noise=0.05)
+    teacher = teacher_of(PlanarArm(5), 20) if name in TAUGHT else None
+    episodes = list(run(make(name, arm), arm, 0, movements=60, teacher=teacher))
+    executed = [episode.index for episode in episodes if episode.move is not None]
+    assert drawn == [stream(0, "environment", index).random() for index in executed]
 
 
 def test_sgim_d_without_a_teacher_is_sagg_riac() -> None:
@@ -170,18 +114,14 @@ def test_sgim_d_without_a_teacher_is_sagg_riac() -> None:
     assert summary(list(alone)) == summary(list(run(sagg_riac(arm, 0), arm, 0, movements=150)))
 
 
-class BreaksOff(CountingArm):
-    """Somebody presses Ctrl-C once, in the movement after so many."""
+def broken_off(after: int) -> ArmThat:
+    """An arm on which somebody presses Ctrl-C once, in the movement after so many."""
 
-    def __init__(self, after: int) -> None:
-        super().__init__(noise=0.05)
-        self.after = after
-
-    def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
-        if len(self.executed) == self.after:
-            self.after = -1
+    def act(n: int, rng: np.random.Generator) -> None:
+        if n == after:
             raise KeyboardInterrupt
-        return super().execute(context, theta, rng)
+
+    return ArmThat(act, noise=0.05)
 
 
 @pytest.mark.parametrize("after", [4, 15, 16])
@@ -189,7 +129,7 @@ def test_a_life_saved_where_a_movement_was_broken_off_goes_on_as_if_it_never_was
     """A lesson waits in the movement after 15 others, since the teacher has just offered it."""
     other = PlanarArm(5, noise=0.05)
     whole = life("sgim-d", other, 60, every=5)
-    arm = BreaksOff(after)
+    arm = broken_off(after)
     learner = make("sgim-d", arm)
     with pytest.raises(KeyboardInterrupt):
         list(run(learner, arm, 0, movements=60, teacher=teacher_of(other, 5)))
@@ -200,7 +140,7 @@ def test_a_life_saved_where_a_movement_was_broken_off_goes_on_as_if_it_never_was
 
 
 def test_a_lesson_whose_answer_was_given_up_is_offered_again_and_such_a_life_can_be_loaded(tmp_path: Path) -> None:
-    arm, other = BreaksOff(15), PlanarArm(5, noise=0.05)
+    arm, other = broken_off(15), PlanarArm(5, noise=0.05)
     learner, teacher = make("sgim-d", arm), teacher_of(other, 5)
     with pytest.raises(KeyboardInterrupt):
         list(run(learner, arm, 0, movements=40, teacher=teacher))

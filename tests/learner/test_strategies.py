@@ -214,6 +214,14 @@ def test_imitation_is_exact_first_and_then_varied_by_less_than_epsilon() -> None
     assert (variations.max(axis=0) > 0.04).all()
 
 
+@pytest.mark.parametrize(("repeats", "exact_first", "n_exact"), [(1, True, 1), (3, True, 1), (3, False, 0)])
+def test_repeats_are_counted_and_the_paper_varies_even_the_first(repeats: int, exact_first: bool, n_exact: int) -> None:
+    imitate = partial(Imitate, repeats=repeats, exact_first=exact_first)
+    moves = live(begin(babbling(MEMORY), imitate, LESSON))
+    assert len(moves) == repeats
+    assert [np.array_equal(move.theta, THETA_D) for move in moves] == [True] * n_exact + [False] * (repeats - n_exact)
+
+
 def test_a_demonstrated_outcome_outside_the_task_space_is_imitated_but_never_a_goal() -> None:
     pursuit = babbling(MEMORY)
     outside = Demonstration(LESSON.context, LESSON.times, LESSON.trajectory, np.array([1.5, 0.0]))

@@ -174,5 +174,5 @@ def test_the_range_of_thetas_is_that_of_all_of_them_whenever_it_is_asked_for(mom
 def test_nothing_is_kept_twice_where_there_is_no_context():
     memory = Memory(0, 3, 2)
     memory.add([], np.zeros(3), np.ones(2))
-    assert np.shares_memory(memory.thetas, memory._policy_side.keys.rows)
-    assert np.shares_memory(memory.outcomes, memory._outcome_side.keys.rows)
+    assert np.shares_memory(memory.thetas, memory._by_theta.keys.rows)
+    assert np.shares_memory(memory.outcomes, memory._by_outcome.keys.rows)

@@ -2,7 +2,6 @@
 
 import ast
 import inspect
-from functools import partial
 from pathlib import Path
 
 import pytest
@@ -127,7 +126,6 @@ class Alien:
     ("make", "message"),
     [
         (Halfway, "Halfway has no add, which every Goals must have"),
-        (partial(Goals), "Goals has no add, sample, which every Goals must have"),
         ("uniform", "must be a class or a function, got 'uniform'; import UniformGoals"),
         ("unifrom", "unknown goals 'unifrom'; did you mean uniform?"),
         (UniformGoals(problem()), "must be a class or a function, got a finished UniformGoals"),

@@ -7,12 +7,8 @@ import pytest
 
 from records import fill, read
 from runs import edit
-from sgimd_torch.evaluation import Benchmark, save_benchmark
-from sgimd_torch.options.command_line import main
 from sgimd_torch.record import Record, RunError, layout
-from sgimd_torch.runs.directory import FILE
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.runs.signals import command
 from sgimd_torch.spaces import stream
 
 SQL = {  # what happens to rows
@@ -91,7 +87,8 @@ def unnoticed(path, content):
         with pytest.raises(RunError):
             Record(path, write=True)
         return None if str(path) in said and "\n" not in said else said
-    Record(path, write=True).close()
+    if path.read_bytes()[18] <= 2:  # above, SQLite takes the file for one of a later version, and only reads it
+        Record(path, write=True).close()
     assert rows == content
     return True
 
@@ -110,7 +107,7 @@ def test_a_file_that_sqlite_has_written_anew_is_the_same_record(tmp_path, whole)
 @pytest.mark.parametrize("what", DAMAGES)
 def test_no_damage_reads_as_something_else(tmp_path, whole, what):
     content = read(whole)
-    for k in range(6):
+    for k in range(12):
         damaged(tmp_path / "run.sqlite", whole, what, k)
         assert unnoticed(tmp_path / "run.sqlite", content) is None or what not in TOLD_ALWAYS
 
@@ -124,24 +121,6 @@ def test_damage_is_told_with_its_row_only_where_it_is_read(tmp_path):
         for table, message in (("errors", "row 3 of errors is not what"), ("regions", "has 7 rows, 12 were written")):
             with pytest.raises(RunError, match=rf"run.sqlite: .*{message}.*sqlite3 run.sqlite .recover"):
                 list(record.rows(table))
-
-
-# Runs with rows in every table: with contexts, a model, and teachers who are asked.
-ALL = "--environment experiments.toys:toss --algorithm sgim-acts-search --teachers all --inverse model"
-SHORT = "--movements 110 --evaluate_at 60 --repeats 2 --inverse.rate 0.5 --inverse.members 2"
-
-
-@pytest.mark.slow
-def test_no_damage_of_a_run_with_all_tables_reads_as_something_else(tmp_path):
-    save_benchmark(tmp_path / "toss.npz", Benchmark("Toy", np.array([[0.5, 0.5], [1.0, 0.5], [0.8, 0.2]]), 0.1))
-    words = [*ALL.split(), *SHORT.split(), "--benchmark", str(tmp_path / "toss.npz"), "--name", "run"]
-    assert command(main, [*words, "--out", str(tmp_path)]) == 0
-    whole = tmp_path / "run/seed-000" / FILE
-    content = read(whole)
-    assert all(content.values())
-    for k in range(1000):
-        damaged(tmp_path / "run.sqlite", whole, DAMAGES[k % len(DAMAGES)], k)
-        unnoticed(tmp_path / "run.sqlite", content)
 
 
 def test_the_file_of_another_seed_is_told_by_its_folder(tmp_path, go, undisturbed, capsys):

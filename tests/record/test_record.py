@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from records import DIMS, fill, moved, read, shown
-from runs import edit, end, start, stopped
+from runs import edit, end, stopped
 from sgimd_torch.learner.events import Event, Kind
 from sgimd_torch.record import Record, RunError
 from sgimd_torch.spaces import Demonstration
@@ -89,20 +89,6 @@ def test_what_cannot_be_kept_is_refused_when_it_is_written(tmp_path, event, mess
             record.add(event)
         record.commit()
     assert len(read(tmp_path / "run.sqlite")["events"]) == 1
-
-
-def test_a_second_writer_is_refused_at_once_and_the_first_goes_on(tmp_path):
-    path = fill(tmp_path / "run.sqlite", n=3)
-    program = "import sys; from sgimd_torch.record import Record; Record(sys.argv[1], write=True)"
-    with Record(path, write=True) as record:
-        with pytest.raises(RunError, match="in use by another process"):
-            Record(path, write=True)
-        _, errors = start(program, path).communicate()
-        assert "in use by another process" in errors
-        record.add(moved([0.1, 0.2, 0.3]))
-        record.commit()
-    with Record(path, write=True) as record:
-        assert record.movements == 4
 
 
 def test_a_reader_beside_a_writer_sees_whole_commits(tmp_path):
@@ -194,27 +180,8 @@ def test_a_reader_that_thinks_for_long_keeps_no_lock_and_sees_one_state(tmp_path
         before = list(reader.rows("events"))
         writer.add(moved([0.1, 0.2, 0.3]))
         writer.replace_rows("goals", [(0, 0.5, 0.5)])
-        assert writer.commit(wait=False)
+        assert writer.commit()
         assert list(reader.rows("events")) == before
-
-
-def test_a_commit_that_another_program_holds_up_is_made_later_and_nothing_is_lost(tmp_path):
-    path = fill(tmp_path / "run.sqlite", n=3)
-    viewer = sqlite3.connect(path, isolation_level=None)
-    with Record(path, write=True) as record:
-        viewer.execute("BEGIN")
-        viewer.execute("SELECT * FROM events").fetchall()
-        for k in range(3):
-            record.add(moved([0.1, 0.2, k]))
-            record.about["seconds"] = k
-            assert not record.commit(wait=False)
-        viewer.close()
-        assert record.commit(wait=False)
-        record.add(moved([0.1, 0.2, 9.0]))
-        record.commit()
-    with Record(path) as record:
-        assert [event.theta[2] for event in record.events() if event.kind == Kind.MOVED][3:] == [0, 1, 2, 9]
-        assert record.about["seconds"] == 2
 
 
 def test_another_writer_is_noticed(tmp_path):

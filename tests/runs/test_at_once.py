@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sgimd_torch.environments.planar_arm import PlanarArm
+from runs import content_of
 from sgimd_torch.record import Record
 from sgimd_torch.runs.at_once import in_processes
-from sgimd_torch.runs.directory import FILE
+from sgimd_torch.runs.directory import RUN_FILE
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.session import live
 from sgimd_torch.spaces import Failure, stream
@@ -72,23 +72,8 @@ def test_processes_give_the_outcomes_and_the_failures_of_one_process(own):
             assert np.array_equal(mine, theirs)
 
 
-def test_a_batch_of_planar_arms_equals_single_movements():
-    for arm in (PlanarArm(7, noise=0.05), PlanarArm(50, noise=0.05, context=True)):
-        rng = stream(0, "batch")
-        contexts = np.array([arm.observe(rng) for _ in range(33)]).reshape(33, arm.contexts.dim)
-        thetas = rng.random((33, arm.policies.dim))
-        streams = [[stream(0, "noise", k) for k in range(33)] for _ in range(2)]
-        single = [arm.execute(*each) for each in zip(contexts, thetas, streams[0], strict=True)]
-        assert np.array_equal(arm.execute_many(contexts, thetas, streams[1]), single)
-
-
 UNJUDGED = ["--evaluate-at", "[]", "--benchmark", "null"]
 RUN = ["--algorithm", "practice", "--at-once", "4", "--environment"]
-
-
-def rows(folder):
-    with Record(folder / FILE) as record:
-        return list(record.rows("events")), list(record.rows("errors"))
 
 
 @pytest.mark.parametrize("robot", ["planar-arm-7", "experiments.toys:toss", "robots_at_once:Odd"])
@@ -100,11 +85,11 @@ def test_a_run_that_was_stopped_goes_on_to_the_rows_of_a_whole_one(go, own, tmp_
     assert go(tmp_path / "whole", *common, "--movements", "200") == 0
     assert go(tmp_path / "parts", *common, "--movements", "120") == 0
     assert go(tmp_path / "parts", *common, "--movements", "200", "--resume") == 0
-    assert rows(tmp_path / "whole" / place) == rows(tmp_path / "parts" / place)
+    assert content_of(tmp_path / "whole" / place) == content_of(tmp_path / "parts" / place)
     assert "after 10" not in capfd.readouterr().err  # the evaluation after 100 movements is kept
     found = read_run(tmp_path / "whole" / place)
     assert found.summary["movements"] == 200
-    with Record(tmp_path / "whole" / place / FILE) as record:
+    with Record(tmp_path / "whole" / place / RUN_FILE) as record:
         places = [event.place for event in record.events()]
     sizes = [here + 1 for here, after in pairwise([*places, 0]) if after == 0]
     assert sizes[:60] == [1] * 60

@@ -1,11 +1,9 @@
-"""Every command that reads a run finds the learner that lived it, whatever happened in the run.
+"""Whoever opens a run finds the learner that lived it, whatever happened in the run.
 
 Each kind of run is made once. While it is made, the living learner is asked what it would do at three goals, after 30
-movements and at the end. Then each command opens the run.
+movements and at the end. Then the run is opened in every way.
 """
 
-import csv
-import io
 import sys
 from dataclasses import replace
 from types import SimpleNamespace
@@ -15,9 +13,10 @@ import pytest
 
 from boards import curves_of
 from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.environments.sketch import traced
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.options.build import build
-from sgimd_torch.options.command_line import parse
+from sgimd_torch.options.command_line import main, parse
 from sgimd_torch.record.saving import save_life
 from sgimd_torch.runs.load import load_learner
 from sgimd_torch.runs.read import read_run
@@ -26,7 +25,7 @@ from sgimd_torch.runs.signals import command
 from sgimd_torch.spaces import stream
 from sgimd_torch.teach.command import options_of
 from sgimd_torch.teach.taught import ALONE, TaughtRun
-from sgimd_torch.views import ask, benchmark, table
+from sgimd_torch.views import benchmark
 from sgimd_torch.views.film import command as film
 from sgimd_torch.views.report import command as report
 from worlds import executed
@@ -104,7 +103,7 @@ def miss_of(parts, thetas):
     """How far the film's movement at the first of ``GOALS`` lands from it, as the film says it."""
     contexts, robot = parts.environment.contexts, parts.environment
     middle = (contexts.low + contexts.high) / 2
-    landed = parts.task.picture(middle, thetas[0], stream(parts.config.seed, "film", 0)).outcome
+    landed = traced(robot, middle, thetas[0], stream(parts.config.seed, "film", 0)).outcome
     return robot.outcomes.amount(float(np.linalg.norm(landed - GOALS[0])))
 
 
@@ -163,6 +162,7 @@ def test_the_runs_are_of_their_kinds(lived):
     assert (recorded["taught"].demonstration >= 0).sum() > 5
     assert "shown" in recorded["asking"].requests["reply"]
     assert np.ptp(recorded["contexts"].contexts) > 0
+    assert len(recorded["contexts"].errors["context_0"]) == 2 * 3  # evaluations, goals
     assert recorded["failures"].failed.sum() > 5
     assert not np.array_equal(lived("prior").answers, lived("plain").answers)
     assert len(recorded["noticed change"].changes) == 1
@@ -174,15 +174,6 @@ def test_the_loaded_learner_is_the_one_that_lived(run):
     learner = load_learner(run.path, trust=True)
     np.testing.assert_array_equal(answers_of(replace(run.parts, learner=learner)), run.answers)
     assert learner.movements == run.parts.learner.movements
-
-
-def test_ask_gives_the_movements_of_the_learner_that_lived(run, tmp_path):
-    (tmp_path / "goals.csv").write_text("\n".join(f"{x},{y}" for x, y in GOALS))
-    words = [str(run.path), "--trust", f"--goals={tmp_path}/goals.csv", f"--out={tmp_path}/answers.csv"]
-    assert command(ask.main, words) == 0
-    rows = list(csv.DictReader(io.StringIO((tmp_path / "answers.csv").read_text())))
-    thetas = [[float(row[f"theta_{k}"]) for k in range(run.answers.shape[1])] for row in rows]
-    np.testing.assert_array_equal(thetas, run.answers)
 
 
 @pytest.mark.parametrize("run", some("taught", "prior", "noticed change", "forward model"), indirect=True)
@@ -219,17 +210,18 @@ def test_a_resumed_run_has_the_learner_that_lived_and_the_board_its_errors(run):
     assert curves_of(run.path)["error/mean"][parts.learner.movements] == pytest.approx(run.error, rel=1e-6)
 
 
-def test_the_table_shows_the_error_of_the_learner_that_lived(run, capsys):
-    assert command(table.main, [str(run.path), "--format=csv"]) == 0
-    (row,) = csv.DictReader(io.StringIO(capsys.readouterr().out))
-    (error,) = (float(value) for name, value in row.items() if name.startswith("error"))
-    assert error == run.error
-
-
-@pytest.mark.parametrize("run", some("plain", "failures"), indirect=True)
-def test_the_report_shows_the_error_of_the_learner_that_lived(run):
-    assert command(report.main, [str(run.path)]) == 0
-    assert f">{run.error:.3f}<" in (run.path / "report.html").read_text()
+def test_a_change_is_said_recorded_and_reported_once(files, tmp_path, capsys):
+    words = f"--environment opened:slipping --evaluate-at [] --repeats 0 --out {tmp_path} --movements".split()
+    assert command(main, [*words, "220"]) == 0
+    said = "since movement 150 outcomes are not what they were"
+    assert said in capsys.readouterr().err
+    (change,) = read_run(tmp_path / "practice/seed-000").changes
+    assert change.startswith(said)
+    assert command(report.main, [str(tmp_path)]) == 0
+    assert said in (tmp_path / "report.html").read_text()
+    assert command(main, [*words, "230", "--resume"]) == 0
+    assert read_run(tmp_path / "practice/seed-000").changes == [change]
+    assert said not in capsys.readouterr().err
 
 
 def test_a_benchmark_is_made_of_the_outcomes_of_the_learner_that_lived(run, tmp_path, capsys):

@@ -27,7 +27,7 @@ from sgimd_torch.options.command_line import main
 from sgimd_torch.record import Record
 from sgimd_torch.runs import evaluations
 from sgimd_torch.runs import run as run_module
-from sgimd_torch.runs.directory import FILE
+from sgimd_torch.runs.directory import RUN_FILE
 from sgimd_torch.runs.read import movements_on_disk, read_run
 from sgimd_torch.runs.signals import command
 from sgimd_torch.spaces import stream
@@ -95,7 +95,7 @@ def test_a_kill_loses_what_came_since_the_last_commit_and_every_evaluation_is_on
 def test_a_run_killed_before_its_record_was_made_starts_afresh(tmp_path, go, reference, capsys):
     directory = tmp_path / "sgim-d" / "seed-003"
     directory.mkdir(parents=True)
-    for name in (FILE, f"{FILE}.7.part"):
+    for name in (RUN_FILE, f"{RUN_FILE}.7.part"):
         (directory / name).touch()
     assert go(tmp_path, "--resume") == 0
     assert "no run yet" in capsys.readouterr().err
@@ -109,18 +109,6 @@ def test_a_run_that_another_process_writes_is_left_alone(tmp_path, go, benchmark
     assert "in use by another process" in capsys.readouterr().err
     assert end(process, signal.SIGCONT)[0] == 0
     assert content_of(tmp_path / "sgim-d" / "seed-003") == reference
-
-
-@pytest.mark.parametrize(("algorithm", "end"), [("observation", 50), ("sgim-d", 60)])
-def test_a_finished_run_made_longer_equals_a_long_run(tmp_path, go, algorithm, end):
-    """The long run is not evaluated after 50 movements; after 60 it is, but the noise is not measured there."""
-    options = ("--algorithm", algorithm)
-    assert go(tmp_path / "long", *options) == 0
-    assert go(tmp_path / "extended", *options, "--movements", end) == 0
-    assert go(tmp_path / "extended", *options, "--resume") == 0
-    extended = tmp_path / "extended" / algorithm / "seed-003"
-    assert content_of(extended) == content_of(tmp_path / "long" / algorithm / "seed-003")
-    assert read_run(extended).config["movements"] == MOVEMENTS
 
 
 WHOLE = [(30, 0), (60, 0), (90, 2)]  # numbers of movements before each evaluation, and of its repeats
@@ -160,6 +148,7 @@ def test_a_resumed_run_makes_only_the_evaluations_that_are_missing_or_asked_for(
         assert evaluated == executed
         evaluated.clear()
     assert content_of(tmp_path / "sgim-d" / "seed-003") == reference
+    assert read_run(tmp_path / "sgim-d" / "seed-003").config["movements"] == MOVEMENTS
 
 
 @pytest.fixture
@@ -178,7 +167,7 @@ def copy(tmp_path, undisturbed):
     ],
 )
 def test_a_damaged_run_is_refused_and_left_as_it_is(tmp_path, copy, go, capsys, damage, message):
-    (copy / FILE).write_bytes(damage) if isinstance(damage, bytes) else edit(copy / FILE, damage)
+    (copy / RUN_FILE).write_bytes(damage) if isinstance(damage, bytes) else edit(copy / RUN_FILE, damage)
     before = files_of(copy)
     assert go(tmp_path, "--resume") == 2
     said = capsys.readouterr().err
@@ -212,7 +201,7 @@ def test_a_replay_that_fails_says_where_and_leaves_the_file_as_it_was(
         vector[0] = value
         return event._replace(**{name: vector})
 
-    rewritten(copy / FILE, change)
+    rewritten(copy / RUN_FILE, change)
     before = files_of(copy)
     assert go(tmp_path, "--resume", "--evaluate_at", "10", "--movements", 95) == 2
     message = capsys.readouterr().err
@@ -251,9 +240,9 @@ def test_a_full_disk_is_reported_and_the_run_can_go_on(tmp_path, go, benchmark, 
 
 def test_a_program_that_reads_the_record_all_the_time_stops_no_run(tmp_path, go, reference, monkeypatch, capsys):
     monkeypatch.setattr(run_module, "COMMIT_EVERY", 0.0)
-    monkeypatch.setattr("sgimd_torch.record._IMPATIENCE", 0.0)
+    monkeypatch.setattr("sgimd_torch.record._PATIENCE", 0.0)
     path, after, commit = (
-        tmp_path / "sgim-d" / "seed-003" / FILE,
+        tmp_path / "sgim-d" / "seed-003" / RUN_FILE,
         run_module.RunLoop._after,
         run_module.RunLoop._try_commit,
     )

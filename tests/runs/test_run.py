@@ -16,7 +16,7 @@ from sgimd_torch.options.build import build
 from sgimd_torch.options.catalogue import WORDS
 from sgimd_torch.runs import evaluations
 from sgimd_torch.runs.read import config_of, read_run
-from sgimd_torch.runs.signals import Progress, Stopped, Stopping
+from sgimd_torch.runs.signals import Progress
 from sgimd_torch.spaces import Demonstration
 
 
@@ -27,41 +27,19 @@ def test_the_same_seed_makes_the_same_record_whatever_the_threads(tmp_path, go, 
     assert "127 demonstrations" in capsys.readouterr().err
 
 
-def answers_of(out, go, *options):
-    assert go(out, *options) == 0
-    (path,) = out.glob("*/seed-003")
-    return read_run(path).evaluations, content_of(path)["events"]
-
-
-def test_what_a_run_learns_with_answers_once_for_both_of_its_names(tmp_path, go):
-    found, _ = answers_of(
-        tmp_path, go, "--algorithm", "sgim-d", "--inverse", "linear", "--evaluated-by", "own,nearest,linear"
-    )
-    assert found["linear"]["mean_error"].tolist() == found["own"]["mean_error"].tolist()
-    assert np.isfinite(found["own"]["noise_floor"]).tolist() == [False, False, True]  # only the last one measures it
-    assert np.isnan(found["linear"]["noise_floor"]).all()
-    parts = build(config_of(read_run(next(tmp_path.glob("*/seed-003")))))
-    assert parts.inverses["linear"] is parts.inverses["own"] is parts.learner.inverse
-    assert parts.inverses["nearest"] is not parts.inverses["own"]
-
-
 def test_a_run_has_the_answers_that_were_asked_for_and_its_movements_do_not_depend_on_them(tmp_path, go, reference):
-    found, log = answers_of(tmp_path, go, "--evaluated-by", "own,nearest,paper")
-    assert list(found) == ["own", "nearest", "paper"]
-    assert log == reference["events"]
-
-
-def test_a_diverging_simulation_is_reported_with_its_theta_and_leaves_a_whole_record(tmp_path, monkeypatch, go, capsys):
-    monkeypatch.chdir(tmp_path)  # where MuJoCo writes a log of its own
-    assert go(tmp_path, "--environment.noise", "1e4") == 1  # commands of thousands of rad
-    errors = capsys.readouterr().err
-    assert "theta=[0." in errors
-    assert "Traceback" not in errors
-    directory = tmp_path / "sgim-d" / "seed-003"
-    run = read_run(directory)
-    assert len(run.index) == run.summary["failed"] == 10
-    assert np.isnan(run.outcomes).all()
-    assert run.summary["finished"] is False
+    """What the run learns with answers once for both of its names."""
+    assert go(tmp_path, "--evaluated-by", "own,nearest,process") == 0
+    run = read_run(tmp_path / "sgim-d" / "seed-003")
+    found = run.evaluations
+    assert list(found) == ["own", "nearest", "process"]
+    assert content_of(run.path)["events"] == reference["events"]
+    assert found["process"]["mean_error"].tolist() == found["own"]["mean_error"].tolist()
+    assert np.isfinite(found["own"]["noise_floor"]).tolist() == [False, False, True]  # only the last one measures it
+    assert np.isnan(found["process"]["noise_floor"]).all()
+    parts = build(config_of(run))
+    assert parts.inverses["process"] is parts.inverses["own"] is parts.learner.inverse
+    assert parts.inverses["nearest"] is not parts.inverses["own"]
 
 
 @pytest.mark.parametrize(
@@ -122,16 +100,6 @@ def test_an_error_of_a_part_keeps_its_traceback_and_says_how_to_go_on(tmp_path, 
     errors = capsys.readouterr().err.splitlines()
     assert errors[-1].startswith("error: ValueError: this cannot be evaluated; 30 movements are kept; to go on: ")
     assert "Traceback (most recent call last):" in errors
-
-
-def test_a_signal_is_heard_and_a_second_one_stops_at_once(capfd):
-    with Stopping() as stopping:
-        assert not stopping.heard
-        signal.raise_signal(signal.SIGTERM)
-        assert stopping.heard == signal.SIGTERM
-        assert "once more stops at once" in capfd.readouterr().err
-        with pytest.raises(Stopped):
-            signal.raise_signal(signal.SIGINT)
 
 
 POOL = """

@@ -23,7 +23,6 @@ from sgimd_torch.runs.sweep import main, variants_of
 # An arm without physics; 40 movements and one evaluation take a moment.
 ARM = "--environment planar-arm-7 --movements 40 --evaluate-at 20 --repeats 0 --inverse linear"
 ALONE = ARM.split()
-SHORT = [*ALONE, "--algorithm", "random"]
 
 
 def short(out, **changes):

@@ -4,11 +4,8 @@ import numpy as np
 import pytest
 
 from runs import about_of, content_of, end, stopped_at
-from sgimd_torch.evaluation import evaluate
-from sgimd_torch.options.build import build
 from sgimd_torch.options.command_line import main
 from sgimd_torch.options.config import Config
-from sgimd_torch.runs.load import load_learner
 from sgimd_torch.runs.read import finished, read_run
 from sgimd_torch.runs.signals import command
 
@@ -99,15 +96,6 @@ def test_a_robot_without_goals_of_evaluation_is_asked_about_goals_within_reach(t
     assert read_run(tmp_path / "practice" / "seed-000").summary["movements"] == 50
 
 
-@pytest.mark.parametrize("until", ["0", "-1", "nan", "inf", "soon", "0.1,0.2"])
-def test_a_limit_that_is_no_error_is_refused_in_a_line(tmp_path, capsys, until):
-    assert command(main, [*ARM.split(), f"--out={tmp_path}", f"--until={until}"]) == 2
-    said = capsys.readouterr().err.splitlines()
-    assert said[0].startswith(("error: until must be an error above 0", "error: --until must be a number"))
-    assert len(said) == 2
-    assert not list(tmp_path.iterdir())
-
-
 SURE = """
 from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.parts import Inverse
@@ -123,16 +111,3 @@ def test_an_inverse_model_of_a_users_own_that_says_how_sure_it_is_ends_the_run(t
     module("confident", SURE)
     assert go(tmp_path, "--until=0.02", "--inverse=confident:Sure") == 0
     assert read_run(path_of(tmp_path)).summary["movements"] == 50
-
-
-def test_a_learner_that_does_not_know_how_sure_it_is_cannot_end_early(tmp_path, capsys):
-    assert go(tmp_path, "--until=0.1", "--inverse=nearest") == 2
-    assert "NearestNeighbour does not" in capsys.readouterr().err
-    assert not list(tmp_path.iterdir())
-
-
-def test_a_loaded_learner_expects_what_the_run_expected(early):
-    learner, run = load_learner(path_of(early)), read_run(path_of(early))
-    arm = build(Config(parts={"environment": "planar-arm-7"})).environment
-    expected = evaluate(learner.inverse, arm, run.benchmark, 3, 200, repeats=0).expected
-    assert expected.tolist() == run.missed_by(200)[1].tolist()

@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 
 from sgimd_torch.algorithms.paper import observation
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
-from sgimd_torch.demonstrations.units import moving
 from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.runs.tasks import Task
@@ -100,13 +99,3 @@ def test_a_planar_arm_is_taught_by_its_last_posture_in_the_middle_of_c():
 def test_a_recording_of_another_robot_is_refused(rod):
     with pytest.raises(ValueError, match=r"trajectory must have shape .*one column for each joint"):
         give(rod, TIMES, np.zeros((51, 7)))
-
-
-def test_stillness_before_and_after_a_movement_is_left_out_and_an_arm_that_did_not_move_teaches_nothing():
-    times = np.arange(201) / 100
-    turn = np.clip(times - 0.5, 0, 0.8)
-    kept, joints = moving(times, np.stack([turn, -turn], axis=1))
-    np.testing.assert_allclose(kept, np.arange(81) / 100, atol=1e-12)
-    np.testing.assert_allclose(joints[[0, -1], 0], [0.0, 0.8], atol=1e-12)
-    with pytest.raises(ValueError, match="no joint moved"):
-        moving(times, np.zeros((201, 2)))

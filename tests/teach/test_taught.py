@@ -1,6 +1,5 @@
 """A taught run without a page: lessons enter the run, which goes on, also without anybody."""
 
-import re
 import shutil
 from dataclasses import replace
 
@@ -14,7 +13,7 @@ from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.signals import command
 from sgimd_torch.runs.tasks.robots import arm_demonstrations
 from sgimd_torch.teach.by_hand import BY_HAND, ByHand
-from sgimd_torch.teach.command import main, options_of
+from sgimd_torch.teach.command import options_of
 from sgimd_torch.teach.taught import TaughtRun
 
 SHOWN = arm_demonstrations(PlanarArm())
@@ -102,20 +101,6 @@ def test_what_cannot_be_shown_is_refused_and_nothing_happens(taught, options, le
         run.show(lesson)
     assert (run.status().movements, run.status().lessons) == (30, 0)
     run.close()
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ("--environment planar-arm-7 --algorithm sagg-riac", "sagg-riac cannot be taught by hand"),
-        ("--environment planar-arm-7 --algorithm sgim-im", "sgim-im cannot be taught by hand"),
-        ("--environment experiments.toys:toss", "Toy cannot be led by the hand: .*; give it an attribute hand_led"),
-    ],
-)
-def test_what_nobody_can_teach_by_hand_is_refused_before_anything_is_written(tmp_path, capsys, words, message):
-    assert command(main, [*words.split(), "--out", str(tmp_path)]) == 2
-    assert re.search(message, capsys.readouterr().err)
-    assert not [*tmp_path.iterdir()]
 
 
 def test_a_run_that_is_taught_has_a_person_as_its_teacher(tmp_path, taught):

@@ -16,13 +16,10 @@ from sgimd_torch.environments.mujoco_robot import MujocoRobot
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.sketch import Sketch
 from sgimd_torch.options import command_line
-from sgimd_torch.record import Record
-from sgimd_torch.runs.directory import FILE
 from sgimd_torch.runs.signals import command
 from sgimd_torch.spaces import Box, stream
 from sgimd_torch.views import check
 from sgimd_torch.views.film import command as film
-from sgimd_torch.views.film.camera import Camera
 from sgimd_torch.views.film.model_camera import viewing
 from sgimd_torch.views.film.reel import PAUSE, RATES, Shot, write_film
 from sgimd_torch.views.film.sketch import Sketchbook, panel
@@ -58,11 +55,6 @@ def decoded(path, height, width):
 
 def positions_along(recording, times):
     return np.stack([recording.float_at(time) for time in times])
-
-
-def test_a_recorded_movement_lands_where_the_executed_one_does(rod, recordings):
-    for k, (theta, recording) in enumerate(zip(THETAS, recordings, strict=True)):
-        np.testing.assert_array_equal(recording.outcome, rod.execute([], theta, stream(1, "noise", 40 + k)))
 
 
 def test_a_recorded_movement_meets_its_context():
@@ -129,8 +121,7 @@ def test_the_caption_says_when_the_line_is_let_out_and_how_far_the_goal_was_miss
     shot = Shot(recording, recording.outcome + np.array([0.03, 0.04]))
     assert shot.missed == pytest.approx(0.05)
     before, after = recording.let_out, (recording.let_out + recording.landed) / 2
-    assert [Camera.note(shot, time) for time in (before, after)] == ["", "line let out"]
-    assert [shot.caption(after, note).endswith(" s   line let out") for note in ("", "line let out")] == [False, True]
+    assert [shot.caption(time).endswith(" s   line let out") for time in (before, after)] == [False, True]
     assert shot.caption(recording.landed).endswith("missed by 0.05")
 
 
@@ -162,15 +153,6 @@ def test_an_interrupted_film_leaves_the_old_one_and_nothing_else(tmp_path):
     with pytest.raises(OSError, match="not encoded"):
         write_film(tmp_path / "film.mp4", [np.zeros((47, 63, 3), np.uint8)])  # odd
     assert [path.read_text() for path in tmp_path.iterdir()] == ["old"]
-
-
-def test_a_run_without_movements_is_refused(run_path, tmp_path, capsys):
-    empty = tmp_path / run_path.name
-    empty.mkdir()
-    with Record(run_path / FILE) as whole:
-        Record.make(empty / FILE, whole.dims, whole.about).close()
-    assert command(film.main, [str(empty)]) == 2
-    assert "has no movements yet" in capsys.readouterr().err
 
 
 def test_without_ffmpeg_nothing_is_replayed(run_path, tmp_path, monkeypatch, capsys):
@@ -346,14 +328,12 @@ def test_the_plane_shows_all_of_the_task_space_and_every_chain_but_objects_may_l
 
 
 @pytest.mark.parametrize(("word", "goal"), [("Slider", "0.4"), ("Slider3", "0.4,0.2,0.9")])
-def test_a_picture_of_ones_own_is_filmed_for_outcomes_of_any_dimension(own, capsys, word, goal):
+def test_a_picture_of_ones_own_is_filmed_for_outcomes_of_any_dimension(own, word, goal):
     live(f"--environment sliders:{word} --algorithm random --movements 30 --evaluate-at [] --out runs")
     run = "runs/random/seed-000"
     assert command(film.main, f"{run} --trust --out one.webp --goals {goal}".split()) == 0
     with Image.open("one.webp") as moving:
         assert moving.size == (640 + 360, 480)
-    assert command(film.main, f"{run} --trust --goals 0.1,0.2,0.3,0.4".split()) == 2
-    assert "--goals must have shape" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -125,14 +125,6 @@ def test_the_numbers_of_a_run_are_those_of_its_evaluations(pages, run):
     assert errors["physics (ms)"] == f"{1000 * run.summary['seconds_physics'] / 60:.2f}"
 
 
-def test_the_numbers_of_a_variant_are_interquartile_means_over_its_seeds(pages, runs):
-    seeds = [read_run(runs / "sgim-d" / f"seed-00{seed}") for seed in (3, 4)]
-    errors = np.array([each.at(60) for each in seeds])
-    row = next(row for row in rows_of(pages["many"], "Errors") if row[0] == "SGIM-D")
-    assert row[1:3] == ["2", "60"]
-    assert row[3] == f"{interquartile_mean(errors):.3f}"
-
-
 def test_a_run_that_has_hardly_begun_is_reported_and_one_that_was_never_evaluated_comes_last(run, tmp_path):
     nothing = {name: column[:0] for name, column in run.evaluations["own"].items()}
     begun = replace(
@@ -168,10 +160,10 @@ def test_a_run_without_evaluations_is_judged_by_its_own_goals(run, tmp_path):
         summary={**run.summary, "movements": 6, "failed": 1},
     )
     variant = Variant("sgim-d", [alone])
-    assert variant.own.movements.tolist() == list(range(7))
-    assert variant.own.missed[0, 1:] == pytest.approx([0.01, 0.01, 0.055, 0.055, 0.1, 0.1])
-    assert variant.own.met[0, 1:] == pytest.approx([1, 1, 1 / 2, 1 / 2, 1 / 3, 1 / 3])
-    assert variant.own.failed[0, 1:] == pytest.approx([0] * 5 + [1 / 6])
+    assert variant.own_goals.movements.tolist() == list(range(7))
+    assert variant.own_goals.missed[0, 1:] == pytest.approx([0.01, 0.01, 0.055, 0.055, 0.1, 0.1])
+    assert variant.own_goals.met[0, 1:] == pytest.approx([1, 1, 1 / 2, 1 / 2, 1 / 3, 1 / 3])
+    assert variant.own_goals.failed[0, 1:] == pytest.approx([0] * 5 + [1 / 6])
     made = page(tmp_path, [variant])
     assert "missed the last 50 goals that it chose by 0.100 m (median), and met 33% of them within 0.02 m." in made
     assert alts(made) == ["Own goals of SGIM-D", "Landing points of SGIM-D"]

@@ -90,21 +90,6 @@ def test_csv_has_all_digits_and_columns_of_the_ends_of_intervals(runs, capsys):
     assert rows["sgim-d"]["seeds"] == "1"
 
 
-def test_latex_needs_no_package_and_no_sign_of_a_name_is_a_command(copied, capsys):
-    (copied / "sgim-d").rename(copied / "a_b&50%")
-    assert table(copied, "--at", 40, "--baseline", "random", "--format", "latex") == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == r"\begin{tabular}{lrrrrrrrrr}"
-    assert lines[-2:] == [r"\hline", r"\end{tabular}"]
-    (odd,) = [line for line in lines if line.startswith(r"a\_b\&50\% & 1 & 40 & ")]
-    assert odd.count(" & ") == 9
-    assert odd.endswith(r" \\")
-    ours, theirs = (
-        read_run(copied / name / "seed-000").evaluations["own"]["mean_error"][-1] for name in ("a_b&50%", "random")
-    )
-    assert f"{ours - theirs:+.4f}".replace("-", "$-$") in odd
-
-
 def test_runs_without_evaluations_are_judged_by_the_goals_that_the_learner_chose(tmp_path, capsys):
     words = "--environment planar-arm-7 --movements 120 --evaluate-at []"
     for algorithm in ("random", "practice"):
@@ -173,23 +158,6 @@ def test_seeds_of_one_name_with_other_settings_are_named(copied, tiny, capsys):
     assert live([*options.split(), "--benchmark", str(tiny), "--out", str(copied)]) == 0
     assert table(copied) == 0
     assert "random: its seeds differ in environment.task_space; were two studies given" in capsys.readouterr().err
-
-
-def last_column(said):
-    """Of each variant, and the head of the column."""
-    head, *lines = said.splitlines()
-    place = head.index("  minus ") + 2
-    return head[place:], {line.split()[0]: line[place:] for line in lines}
-
-
-def test_few_seeds_are_compared_with_the_baseline_by_their_differences_alone(runs, capsys):
-    assert table(runs, "--at", 40, "--baseline", "random") == 0
-    head, found = last_column(capsys.readouterr().out)
-    ours, theirs = (
-        read_run(runs / name / "seed-000").evaluations["own"]["mean_error"][-1] for name in ("sgim-d", "random")
-    )
-    assert head == "minus random (m)"
-    assert found == {"random": "-", "sgim-d": f"{ours - theirs:+.4f}"}  # of the only seed that both have
 
 
 def test_columns_are_as_wide_as_their_widest_cell_and_lines_end_with_text(capsys):

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
@@ -19,9 +18,6 @@ from sgimd_torch.evaluation import Benchmark, load_benchmark
 from sgimd_torch.files import checksum
 from sgimd_torch.learner import Correspondence
 from sgimd_torch.spaces import Array, Box, Demonstration
-
-if TYPE_CHECKING:
-    from sgimd_torch.environments.sketch import Tracer
 
 MAX_GOALS: Final = 500  # largest number of benchmark goals for a task that brings none
 
@@ -47,14 +43,6 @@ class Task:
 
     def __post_init__(self) -> None:
         check_instance(self.environment)
-
-    @property
-    def picture(self) -> Tracer | None:
-        """The method ``trace`` of a `Drawn` environment, with checks of its result; None for other environments."""
-        from sgimd_torch.environments.sketch import Drawn, traced  # only films need them
-
-        robot = self.environment
-        return partial(traced, robot, robot.trace) if isinstance(robot, Drawn) else None
 
 
 def grid_over(box: Box, counts: Sequence[int] | Array) -> Array:

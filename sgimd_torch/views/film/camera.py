@@ -35,11 +35,11 @@ GOAL: Final = (0.94, 0.89, 0.26, 1.0)  # colour of the goal
 PAST: Final = (0.92, 0.96, 1.0, 0.7)  # colour of past outcomes
 
 
-class Camera:
-    """A `Painter` and context manager that draws shots of the rod without a window.
+class MujocoPainter:
+    """A context manager that draws states of a model, without a window, in the size of a film.
 
     Args:
-        model: MuJoCo model of the rod; it is not changed.
+        model: MuJoCo model; it is not changed.
 
     Raises:
         ImportError: OpenGL is not available in the form that the variable MUJOCO_GL names.
@@ -47,12 +47,17 @@ class Camera:
 
     def __init__(self, model: mujoco.MjModel) -> None:
         self._model = copy.copy(model)
-        for name in ("line", "float"):  # hidden here, because ``frame`` draws both thicker
-            self._model.material(name).rgba[3] = 0.0
+        size = self._model.vis.global_  # a model may ask for smaller pictures
+        size.offwidth, size.offheight = max(WIDTH, size.offwidth), max(HEIGHT, size.offheight)
         self._data = mujoco.MjData(self._model)
-        self._tip = self._model.site("tip").id
-        self._line = [self._model.body(f"line_{k:02}").id for k in range(2, 31)]
-        self._renderer = renderer_of(self._model)
+        try:
+            self._renderer = mujoco.Renderer(self._model, HEIGHT, WIDTH)
+        # Each OpenGL library fails in a different way.
+        except (mujoco.FatalError, AttributeError, RuntimeError, ImportError) as error:
+            raise ImportError(
+                f"MuJoCo finds no OpenGL to draw with (MUJOCO_GL={os.environ.get('MUJOCO_GL', '')}: {error}); without "
+                "a display set MUJOCO_GL=egl and install libegl1 (Debian, Ubuntu), or MUJOCO_GL=osmesa and libosmesa6"
+            ) from error
 
     def __enter__(self) -> Self:
         return self
@@ -60,18 +65,33 @@ class Camera:
     def __exit__(self, *_: object) -> None:
         self._renderer.close()
 
+    def _at(self, state: Array) -> mujoco.MjData:
+        mujoco.mj_setState(self._model, self._data, state, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+        mujoco.mj_forward(self._model, self._data)
+        return self._data
+
+
+class Camera(MujocoPainter):
+    """A `Painter` of shots of the rod, whose ``model`` it gets."""
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        super().__init__(model)
+        for name in ("line", "float"):  # hidden here, because ``frame`` draws both thicker
+            self._model.material(name).rgba[3] = 0.0
+        self._tip = self._model.site("tip").id
+        self._line = [self._model.body(f"line_{k:02}").id for k in range(2, 31)]
+
     def frame(self, shot: Shot, time: float) -> Image.Image:
         """The scene at ``time`` (s); after the landing, the scene at the landing.
 
         The picture shows arm, line, float and the path of the float. On the water it shows the goal, past landings, and
         circles with radii of 0.5 m and 1 m around the arm.
         """
-        recording = _trace(shot)
+        recording = shot.recording
+        assert isinstance(recording, RodTrace)
         time = min(time, recording.landed)
         row = min(round(time / recording.step), len(recording.states) - 1)
-        mujoco.mj_setState(self._model, self._data, recording.states[row], mujoco.mjtState.mjSTATE_FULLPHYSICS)
-        mujoco.mj_forward(self._model, self._data)
-        self._renderer.update_scene(self._data, camera="shore")
+        self._renderer.update_scene(self._at(recording.states[row]), camera="shore")
         scene, float_at_time = self._renderer.scene, recording.float_at(time)
         for radius in (0.5, 1.0):
             draw_chain(scene, _circle(np.zeros(2), radius), 0, RING)
@@ -86,33 +106,6 @@ class Camera:
         if time == recording.landed:
             draw_chain(scene, [np.append(shot.goal, 0.006), np.append(recording.outcome, 0.006)], 0.005, GOAL)
         return Image.fromarray(self._renderer.render())
-
-    @staticmethod
-    def note(shot: Shot, time: float) -> str:
-        """The note "line let out" from the moment when the line is let out, "" before."""
-        let_out = _trace(shot).let_out
-        return "line let out" if let_out is not None and time > let_out else ""
-
-
-def renderer_of(model: mujoco.MjModel) -> mujoco.Renderer:
-    """A renderer of pictures of a model, in the size of a film.
-
-    Raises:
-        ImportError: OpenGL is not available in the form that the variable MUJOCO_GL names.
-    """
-    try:
-        return mujoco.Renderer(model, HEIGHT, WIDTH)
-    # Each OpenGL library fails in a different way.
-    except (mujoco.FatalError, AttributeError, RuntimeError, ImportError) as error:
-        raise ImportError(
-            f"MuJoCo finds no OpenGL to draw with (MUJOCO_GL={os.environ.get('MUJOCO_GL', '')}: {error}); without "
-            "a display set MUJOCO_GL=egl and install libegl1 (Debian, Ubuntu), or MUJOCO_GL=osmesa and libosmesa6"
-        ) from error
-
-
-def _trace(shot: Shot) -> RodTrace:
-    assert isinstance(shot.recording, RodTrace)
-    return shot.recording
 
 
 def _circle(centre: Array, radius: float) -> Array:

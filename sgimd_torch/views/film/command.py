@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
-from sgimd_torch.environments.sketch import Sketch
+from sgimd_torch.environments.sketch import Sketch, traced
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.figures.names import colour, label
 from sgimd_torch.runs.load import OpenRun
@@ -54,7 +54,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     options = _options(argv)
     run = _opened(options.run, trust=options.trust)
     recorded, parts = run.recorded, run.parts
-    if parts.task.picture is None:
+    if getattr(parts.environment, "trace", None) is None:
         raise ValueError(
             f"{recorded.path} is of {recorded.config['environment']}, which cannot be filmed: it needs a method "
             "trace(context, theta, rng) -> Sketch"
@@ -133,8 +133,7 @@ def _cast(run: OpenRun, goals: Array, context: Array, stages: Sequence[int]) -> 
         stages: numbers of movements; robots that move at once end the last movements together, so there may be more.
     """
     recorded, parts = run.recorded, run.parts
-    robot, picture, benchmark = parts.environment, parts.task.picture, parts.benchmark
-    assert picture is not None
+    robot, benchmark = parts.environment, parts.benchmark
     config, seed = recorded.config, recorded.config["seed"]
     names = robot.contexts.names or [f"context {k}" for k in range(robot.contexts.dim)]
     seen = ", ".join(f"{name} {robot.contexts.amount(x)}" for name, x in zip(names, context, strict=True))
@@ -151,7 +150,7 @@ def _cast(run: OpenRun, goals: Array, context: Array, stages: Sequence[int]) -> 
         past = past[np.isfinite(past[:, 0])]
         title = f"{who}, seed {seed}, after {movements} movements" + f"\n{seen}" * bool(seen)
         for k, goal in enumerate(goals):
-            recording = picture(context, inverse(context, goal).theta, stream(seed, "film", k))
+            recording = traced(robot, context, inverse(context, goal).theta, stream(seed, "film", k))
             shots.append(Shot(recording, goal, context, title, robot.outcomes.unit, past))
         evaluation = evaluate(inverse, robot, benchmark.goals, seed, movements, context=context, repeats=0)
         errors.append(evaluation.errors)

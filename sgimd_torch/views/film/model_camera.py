@@ -6,11 +6,10 @@ The model's own camera is used if it is fixed to the world and sees all of T. El
 
 from __future__ import annotations
 
-import copy
 import math
 from collections.abc import Sequence
 from itertools import combinations, product
-from typing import Final, Self
+from typing import Final
 
 import mujoco
 import numpy as np
@@ -18,7 +17,7 @@ from PIL import Image
 
 from sgimd_torch.environments.mujoco_robot import Filmed, MujocoRobot
 from sgimd_torch.spaces import Array
-from sgimd_torch.views.film.camera import GOAL, MOST_PAST, PAST, add_geom, draw_chain, renderer_of
+from sgimd_torch.views.film.camera import GOAL, MOST_PAST, PAST, MujocoPainter, add_geom, draw_chain
 from sgimd_torch.views.film.reel import HEIGHT, WIDTH, Shot
 
 FILLED: Final = 0.8  # share of the picture, in height and width, that shows robot and T
@@ -28,26 +27,20 @@ END: Final = (0.82, 0.2, 0.12, 1.0)  # colour of the measured places
 BALL: Final = mujoco.mjtGeom.mjGEOM_SPHERE
 
 
-class ModelCamera:
-    """A `Painter` and context manager that draws shots of a robot from a model file, without a window.
+class ModelCamera(MujocoPainter):
+    """A `Painter` of shots of a robot from a model file.
 
     Args:
         robot: robot of the shots.
         shots: all shots of the film; one camera sees them all.
-
-    Raises:
-        ImportError: OpenGL is not available in the form that the variable MUJOCO_GL names.
     """
 
     def __init__(self, robot: MujocoRobot, shots: Sequence[Shot]) -> None:
-        self._robot, self._model = robot, copy.copy(robot.model)
-        size = self._model.vis.global_  # a model may ask for smaller pictures
-        size.offwidth, size.offheight = max(WIDTH, size.offwidth), max(HEIGHT, size.offheight)
-        self._data = mujoco.MjData(self._model)
+        super().__init__(robot.model)
+        self._robot = robot
         if not self._model.nlight:
             light = self._model.vis.headlight
             light.ambient[:], light.diffuse[:] = 0.4, 0.6
-        self._renderer = renderer_of(self._model)
         for effect in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):  # three times slower
             self._renderer.scene.flags[effect] = False
         corners = np.concatenate([_edges(robot, shot).reshape(-1, 3) for shot in shots])
@@ -55,12 +48,6 @@ class ModelCamera:
         seen = np.concatenate([corners, *arm])
         self._camera = viewing(self._model, self._data, seen)
         self._far = float(np.ptp(seen, axis=0).max())
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._renderer.close()
 
     def frame(self, shot: Shot, time: float) -> Image.Image:
         """The scene at ``time`` (s); after the end of the movement, the last state and the outcome.
@@ -86,16 +73,6 @@ class ModelCamera:
             if time >= recording.landed:
                 draw_chain(scene, [goal, path[-1]], 0.4 * size, GOAL)
         return Image.fromarray(self._renderer.render())
-
-    @staticmethod
-    def note(shot: Shot, time: float) -> str:
-        """Always ""."""
-        return ""
-
-    def _at(self, state: Array) -> mujoco.MjData:
-        mujoco.mj_setState(self._model, self._data, state, mujoco.mjtState.mjSTATE_FULLPHYSICS)
-        mujoco.mj_forward(self._model, self._data)
-        return self._data
 
 
 def viewing(model: mujoco.MjModel, data: mujoco.MjData, points: Array) -> int | mujoco.MjvCamera:

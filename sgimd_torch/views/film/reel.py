@@ -15,16 +15,19 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
-from typing import Final, Protocol
+from typing import TYPE_CHECKING, Final, Protocol
 
 import numpy as np
 from imageio_ffmpeg import get_ffmpeg_exe
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from sgimd_torch.environments.sketch import Trace
+from sgimd_torch.environments.sketch import Sketch
 from sgimd_torch.files import check_writable, replacing
 from sgimd_torch.spaces import Array
+
+if TYPE_CHECKING:
+    from sgimd_torch.environments.rod_physics import RodTrace  # loads MuJoCo, which then chooses how to draw
 
 Frame = NDArray[np.uint8]  # (height, width, 3)
 
@@ -54,7 +57,7 @@ class Shot:
         beside: picture to the right of the robot, None for none.
     """
 
-    recording: Trace
+    recording: RodTrace | Sketch
     goal: Array
     context: Array = field(default_factory=lambda: np.empty(0))
     title: str = ""
@@ -71,12 +74,13 @@ class Shot:
         """Times (s) of the frames, ``rate`` per second."""
         return list(np.arange(0.0, self.recording.landed + PAUSE, 1 / rate).tolist())
 
-    def caption(self, time: float, note: str = "") -> str:
-        """The text below the picture at ``time`` (s): the goal and a ``note``; at the end, the goal and the outcome."""
+    def caption(self, time: float) -> str:
+        """The text below the picture at ``time`` (s): the goal, and at the end the outcome."""
         goal = f"goal {_place(self.goal)}"
         if time >= self.recording.landed:
             return f"{goal}, reached {_place(self.recording.outcome)}: missed by {self.missed:.2g} {self.unit}".rstrip()
-        return f"{goal}   {time:.2f} s   {note}".rstrip()
+        let_out = getattr(self.recording, "let_out", None)  # of the fishing rod
+        return f"{goal}   {time:.2f} s{'   line let out' if let_out is not None and time > let_out else ''}"
 
 
 class Painter(Protocol):
@@ -86,16 +90,12 @@ class Painter(Protocol):
         """The scene at ``time`` (s); after the end of the movement, the scene at the end."""
         ...
 
-    def note(self, shot: Shot, time: float) -> str:
-        """A note for the caption at ``time`` (s), "" for none."""
-        ...
-
 
 def shoot(painter: Painter, shots: Iterable[Shot], rate: float = RATES[".mp4"]) -> Iterator[Frame]:
     """The frames of a film, ``rate`` per second: each movement, with its end shown for ``PAUSE`` seconds."""
     for shot in shots:
         for time in shot.moments(rate):
-            frame = captioned(painter.frame(shot, time), shot.title, shot.caption(time, painter.note(shot, time)))
+            frame = captioned(painter.frame(shot, time), shot.title, shot.caption(time))
             yield frame if shot.beside is None else np.concatenate([frame, shot.beside], axis=1)
 
 

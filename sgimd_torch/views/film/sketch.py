@@ -84,10 +84,6 @@ class Sketchbook:
             ax.plot(*in_picture(sketch.outcome[None]).T, "x", color=END, ms=12, mew=2)
         return Image.fromarray(pixels(self._figure))
 
-    def note(self, shot: Shot, time: float) -> str:
-        """Always ""."""
-        return ""
-
 
 def in_picture(points: Array) -> Array:
     """``(n, 2)`` places of outcomes ``(n, outcome_dim)`` in the picture."""

@@ -83,17 +83,17 @@ def error_curves(figure: Figure, variants: Sequence[Variant], colours: Mapping[s
     for variant in variants:
         n, colour, (centre, low, high) = len(variant.used), colours[variant.name], variant.curve
         if n > 1 and variant.few:
-            when = np.broadcast_to(variant.evaluated, variant.errors.shape)
+            when = np.broadcast_to(variant.evaluated_at, variant.errors.shape)
             ax.scatter(when, variant.errors, s=12, color=colour, alpha=0.6, linewidths=0)
         elif n > 1:
-            ax.fill_between(variant.evaluated, low, high, color=colour, alpha=0.2, linewidth=0)
+            ax.fill_between(variant.evaluated_at, low, high, color=colour, alpha=0.2, linewidth=0)
         if n > 1 and len(variants) == 1:
-            ax.plot(variant.evaluated, variant.errors.T, color=colour, linewidth=0.7, alpha=0.4)
+            ax.plot(variant.evaluated_at, variant.errors.T, color=colour, linewidth=0.7, alpha=0.4)
         label = f"{_curve_name(variant.label)} ({_seeds(n)})"
-        ax.plot(variant.evaluated, centre, "o-", color=colour, markersize=4.5, label=label)
+        ax.plot(variant.evaluated_at, centre, "o-", color=colour, markersize=4.5, label=label)
         if len(variants) == 1:
             floor = variant.floors.mean(axis=0)
-            ax.plot(variant.evaluated, floor, "_--", color="black", linewidth=1.2, markersize=8, label="noise floor")
+            ax.plot(variant.evaluated_at, floor, "_--", color="black", linewidth=1.2, markersize=8, label="noise floor")
     over_movements(ax, variants[0].space.in_unit("mean distance to benchmark goals"))
     ax.set_ylim(bottom=0)
     handles = [line for line in ax.lines if not str(line.get_label()).startswith("_")]
@@ -105,7 +105,7 @@ curves = png(error_curves)
 
 def has_own_goals(variant: Variant) -> bool:
     """Whether a learner chose goals of its own; one that moves at random does not."""
-    return bool(np.isfinite(variant.own.missed).any())
+    return bool(np.isfinite(variant.own_goals.missed).any())
 
 
 @png
@@ -114,7 +114,7 @@ def own_goals(figure: Figure, variant: Variant) -> None:
 
     They are interquartile means over seeds, with a thin line for each seed.
     """
-    own, colour = variant.own, COLOURS.get(variant.algorithm, "#0072b2")
+    own, colour = variant.own_goals, COLOURS.get(variant.algorithm, "#0072b2")
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     for ax, values, ink, dashes, label in (
         (upper, own.missed, colour, "-", "missed"),

@@ -33,7 +33,7 @@ def warnings(variants: Sequence[Variant]) -> Iterator[str]:
     for variant in variants:
         if own := differing([variant]):
             yield f"The seeds of {variant.label} have different settings: they differ in {', '.join(own)}."
-    lasts = sorted({variant.last for variant in variants if variant.last})
+    lasts = sorted({variant.compared_at for variant in variants if variant.compared_at})
     if len(lasts) > 1:
         yield f"The last errors belong to different numbers of movements: {', '.join(map(str, lasts))}."
     for run in every:
