@@ -10,7 +10,7 @@ from typing import Final
 
 from sgimd_torch import __version__
 from sgimd_torch.options.catalogue import WORDS, about, unknown_name_error
-from sgimd_torch.runs.signals import command, loading
+from sgimd_torch.runs.signals import ONE_THREAD, command, loading
 
 EXTRAS: Final = {
     **dict.fromkeys(("demonstrations", "demo"), "plot"),
@@ -41,8 +41,8 @@ sgimd COMMAND --help explains a command; sgimd --version prints the version."""
 
 def main() -> int:
     """Run the command that the first argument names, and return the exit code."""
-    for library in ("OMP", "OPENBLAS", "MKL"):  # several threads would be slower for small matrices
-        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+    for name, threads in ONE_THREAD.items():
+        os.environ.setdefault(name, threads)
     return command(_call)
 
 

@@ -50,10 +50,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     Raises:
         OSError: ``path`` is a directory, or cannot be written.
     """
-    path = Path(path)
-    if path.is_dir():
-        raise IsADirectoryError(f"{path} is a directory; was the name of the file left out?")
-    partial = path.with_name(f"{path.name}.{os.getpid()}.part")
+    partial = _partial(Path(path))
     try:
         yield partial
         with open(partial, "rb+") as file:
@@ -61,6 +58,24 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
         os.replace(partial, path)
     finally:
         partial.unlink(missing_ok=True)
+
+
+def check_writable(path: str | os.PathLike[str]) -> None:
+    """Refuse a file that ``replacing`` could not write, before the work for its content begins.
+
+    Raises:
+        OSError: ``path`` is a directory, or cannot be written.
+    """
+    partial = _partial(Path(path))
+    partial.touch()
+    partial.unlink()
+
+
+def _partial(path: Path) -> Path:
+    """Path of the temporary file next to ``path``."""
+    if path.is_dir():
+        raise IsADirectoryError(f"{path} is a directory; was the name of the file left out?")
+    return path.with_name(f"{path.name}.{os.getpid()}.part")
 
 
 def write_bytes(path: str | os.PathLike[str], content: bytes) -> None:

@@ -107,7 +107,13 @@ class Part(Built):
 
 
 class Trained(ABC):
-    """Object that parts share and that is trained while the learner moves, such as a forward model."""
+    """Object that parts share and that is trained while the learner moves, such as a forward model.
+
+    Attributes:
+        device: device that trains, for the record; "" if there is no choice.
+    """
+
+    device: str = ""
 
     @abstractmethod
     def refresh(self, memory: Memory) -> object:

@@ -123,9 +123,10 @@ def run(
         if record is not None:
             events = record.events()
             if (first_event := next(events, None)) is not None:
-                from sgimd_torch.record.replay import replay  # a new life has nothing to replay
+                from sgimd_torch.record.replay import repeats_exactly, replay  # a new life has nothing to replay
 
-                before = yield from replay(learner, chain([first_event], events), teacher=teacher)
+                exact = repeats_exactly(record.about, learner)
+                before = yield from replay(learner, chain([first_event], events), teacher=teacher, exact=exact)
             learner.listeners.append(record.add)
             at_the_end.callback(learner.listeners.remove, record.add)
         failed_in_a_row: list[Failure] = []

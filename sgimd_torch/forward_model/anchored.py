@@ -13,6 +13,7 @@ from typing import Final
 import torch
 
 from sgimd_torch.forward_model.model import ForwardModel
+from sgimd_torch.forward_model.training import one_thread
 from sgimd_torch.spaces import Array, Box
 
 # All numbers are relative to Pi or to the spread of outcomes, so the unit of T does not matter.
@@ -39,6 +40,7 @@ class Anchored:
         outcomes: ``(n, m, outcome_dim)``, outcomes of the anchors.
     """
 
+    @one_thread()
     def __init__(
         self, model: ForwardModel, policies: Box, context: Array, contexts: Array, thetas: Array, outcomes: Array
     ) -> None:
@@ -59,6 +61,7 @@ class Anchored:
             self._precision = torch.cholesky_inverse(torch.linalg.cholesky(covariance + torch.diag_embed(noise)))
             self._prior_variance, self._weights = prior_sd[:, 0] ** 2, self._precision @ errors
 
+    @one_thread()
     def predict(self, theta: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         """Expected outcomes ``(n, outcome_dim)`` of ``theta`` ``(n, theta_dim)``, and their variances ``(n,)``: the
         weighted sum of noise, disagreement between members, and variance of the process."""
@@ -105,6 +108,7 @@ class Anchored:
             theta = theta.clamp(self.low, self.high)
         return theta.detach()
 
+    @one_thread()
     def best(self, starts: Array, goals: Array, *, steps: int, step: float, radius: float | None = None) -> Array:
         """For each of the ``goals`` ``(n_goals, outcome_dim)`` the best theta ``(n_goals, theta_dim)`` of descents from
         its ``starts`` ``(n_goals, n_starts, theta_dim)``; options of `descend`."""

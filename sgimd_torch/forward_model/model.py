@@ -14,7 +14,7 @@ import numpy as np
 import torch
 
 from sgimd_torch.forward_model.ensemble import Ensemble
-from sgimd_torch.forward_model.training import Fit, OnlineTrainer
+from sgimd_torch.forward_model.training import Fit, OnlineTrainer, one_thread
 from sgimd_torch.memory import Memory
 from sgimd_torch.spaces import Array, check_count, check_vector, stream
 
@@ -64,7 +64,7 @@ class ForwardModel(Ensemble):
         rate: number of steps of the optimiser for each new exemplar; .3 steps take a fifth of the time of a movement of
             the fishing rod, 2 steps take as long as such a movement.
         noise_heads: true: the predicted noise depends on the movement; false: all movements have the same noise.
-        accelerator: Lightning's name of the device for training: cpu (the fastest for these sizes), auto or cuda.
+        accelerator: device for training: auto (the CPU, the fastest for these sizes), cpu, cuda or mps.
         trust: relative error above which the forward model is not used.
 
     Attributes:
@@ -72,7 +72,7 @@ class ForwardModel(Ensemble):
             and the number of exemplars that the model has learnt from.
 
     Raises:
-        ValueError: a number is out of its range.
+        ValueError: a number is out of its range, or this machine has no such device.
     """
 
     input_mean: torch.Tensor  # (context_dim + theta_dim,)
@@ -94,7 +94,7 @@ class ForwardModel(Ensemble):
         every: int = 50,
         rate: float = 1.0,
         noise_heads: bool = True,
-        accelerator: str = "cpu",
+        accelerator: str = "auto",
         trust: float = TRUSTED_UP_TO,
     ) -> None:
         sizes = {"context_dim": context_dim, "theta_dim": theta_dim, "outcome_dim": outcome_dim}
@@ -128,6 +128,11 @@ class ForwardModel(Ensemble):
         return float(self.missed) if self.trained else math.inf
 
     @property
+    def trained_on(self) -> str:
+        """Device that trains, and the instructions of the processor, which round differently."""
+        return f"{self._online.prepare().device.type}, {torch.backends.cpu.get_cpu_capability()}"
+
+    @property
     def trusted(self) -> bool:
         """Whether the relative error is small enough to use the model."""
         return self.relative_error <= self.trust
@@ -145,6 +150,7 @@ class ForwardModel(Ensemble):
         mean, variance = mean.reshape(shape), log_variance.exp().reshape(shape)
         return self.outcome_mean + self.outcome_scale * mean, self.outcome_scale**2 * variance
 
+    @one_thread()
     def predict(self, contexts: Array, thetas: Array) -> Prediction:
         """Prediction of the outcomes of movements.
 
@@ -165,6 +171,7 @@ class ForwardModel(Ensemble):
         means, variances = (tensor.cpu().double().numpy() for tensor in members)
         return Prediction(means.mean(axis=0), means.std(axis=0), np.sqrt(variances.mean(axis=0)))
 
+    @one_thread()
     def refresh(self, memory: Memory) -> Refresh | None:
         """Learn from new and old exemplars in ``memory``; None if fewer than ``every`` exemplars are new, or all
         outcomes are equal.

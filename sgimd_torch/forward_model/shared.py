@@ -36,6 +36,7 @@ class SharedModel(Trained):
 
     def __init__(self, problem: Problem, **options: Any) -> None:
         self.model = ForwardModel(*problem.dims, seed=problem.seed, **options)
+        self.device = self.model.trained_on
 
     def refresh(self, memory: Memory) -> Refresh | None:
         """Result of `ForwardModel.refresh`."""

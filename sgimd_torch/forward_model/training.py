@@ -7,13 +7,19 @@ The training uses Lightning Fabric, with one optimiser for all fits, so that Ada
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from typing import Any, Final, NamedTuple
 
 import torch
 from lightning import Fabric
+from lightning.fabric.accelerators import ACCELERATOR_REGISTRY
+from lightning.fabric.plugins.environments.lightning import LightningEnvironment
 
 from sgimd_torch.forward_model.ensemble import Ensemble, nll
+from sgimd_torch.options.catalogue import did_you_mean
 
 _RECENT: Final = 0.25  # share of every batch that is drawn from the newest exemplars
 _BATCH: Final = 128  # number of exemplars in a step, for each member
@@ -46,22 +52,28 @@ class OnlineTrainer:
         ensemble: networks, whose weights change.
         generator: random stream of the batches; each member has batches of its own.
         newest: number of last exemplars that count as the newest.
-        accelerator: Lightning's name of the device that trains.
+        accelerator: Lightning's name of the device that trains, or auto for the CPU.
+
+    Raises:
+        ValueError: this machine has no such device.
     """
 
     ensemble: Ensemble
     generator: torch.Generator
     newest: int
     accelerator: str
-    fabric: Fabric | None = None
+    fabric: Fabric | None = field(init=False)
     optimizer: Any = None
+
+    def __post_init__(self) -> None:
+        self.fabric = fabric_on(self.accelerator)  # refuses a missing device before the first movement
 
     def prepare(self) -> Fabric:
         """Move the weights to the device for training and make the optimiser, unless this was done before."""
         if self.fabric is None:
-            self.fabric = Fabric(accelerator=self.accelerator, devices=1)
-            self.ensemble.to(self.fabric.device)
+            self.fabric = fabric_on(self.accelerator)
         if self.optimizer is None:
+            self.ensemble.to(self.fabric.device)
             self.optimizer = self.fabric.setup_optimizers(self.ensemble.configure_optimizers())
         return self.fabric
 
@@ -126,3 +138,44 @@ class OnlineTrainer:
         """Restore these weights, with a new optimiser, because the old moments belong to other weights."""
         self.ensemble.load_state_dict(weights)
         self.optimizer = None
+
+
+def fabric_on(accelerator: str) -> Fabric:
+    """Fabric on one device of this process, whatever launcher has started the process.
+
+    Args:
+        accelerator: Lightning's name of the device, or auto for the CPU.
+
+    Raises:
+        ValueError: this machine has no such device, or torch cannot use it.
+    """
+    name = "cpu" if accelerator == "auto" else accelerator
+    # ``fabric run`` leaves its choices in such variables, which Fabric would prefer to these arguments.
+    hidden = {name: os.environ.pop(name) for name in [*os.environ] if name.startswith("LT_")}
+    try:
+        fabric = Fabric(accelerator=name, devices=1, plugins=[LightningEnvironment()])
+        torch.zeros(1, device=fabric.device)  # a device may be found that torch cannot use
+    except (RuntimeError, ValueError, ImportError) as error:
+        known = ACCELERATOR_REGISTRY.available_accelerators()
+        usable = [word for word in known if ACCELERATOR_REGISTRY[word]["accelerator"].is_available()]
+        elsewhere = f"; is it meant for another machine, or is torch {torch.__version__} built without {accelerator}?"
+        slip = elsewhere if accelerator in (*known, "gpu") else did_you_mean(accelerator, ["auto", *known])
+        devices = " or ".join(["auto", *usable])
+        raise ValueError(f"accelerator must be {devices} on this machine, got {accelerator!r}{slip}") from error
+    finally:
+        os.environ.update(hidden)
+    return fabric
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """One thread of torch in a block or a decorated function, because sums of several threads round differently."""
+    before = torch.get_num_threads()
+    if before == 1:
+        yield
+        return
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)

@@ -25,10 +25,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     program = ["sgimd"] if Path(sys.argv[0]).name == "sgimd" else [sys.executable, "-m", "sgimd_torch"]
     again = [*program, "run", *argv, *([] if resume else ["--resume"])]
     with loading():
-        from sgimd_torch.options.build import build  # imported here so that --help is fast
-        from sgimd_torch.runs.directory import with_found_earlier
+        from sgimd_torch.runs.directory import (
+            RUN_FILE,
+            build_again,
+            holds_run,
+            with_found_earlier,
+        )  # loaded late, so --help is fast
         from sgimd_torch.runs.run import run_one
-    parts = build(with_found_earlier(config))
+    parts = build_again(with_found_earlier(config), recorded=resume and holds_run(config.directory / RUN_FILE))
     with Stopping() as stopping:
         print(run_one(parts, stopping, resume=resume, again=shlex.join(again)))
     return 0

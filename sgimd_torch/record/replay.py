@@ -8,8 +8,8 @@ attempt. So `sgimd_torch.record` has to keep nothing but events.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Generator, Iterable, Iterator
-from typing import Final
+from collections.abc import Generator, Iterable, Iterator, Mapping
+from typing import Any, Final
 
 import numpy as np
 
@@ -20,6 +20,10 @@ from sgimd_torch.record.layout import ReplayError
 from sgimd_torch.spaces import Array, Box, Demonstration, Episode, Failure, Move, Request
 
 _HINT: Final = "was it recorded by another version, on another processor or with another configuration?"
+_TRAINED_ELSEWHERE: Final = (
+    "movement {} was recorded with another theta: another device or processor trained the forward model. The learner "
+    "remembers the recorded thetas"
+)
 _ALONE: Final = (Kind.SHOWN, Kind.ASKED, Kind.ADDED, Kind.CHANGED)  # events that are never grouped with others
 _ROUNDED: Final = (
     "movement {} was recorded with a theta that differs by rounding: another version or processor made the record. The "
@@ -28,7 +32,7 @@ _ROUNDED: Final = (
 
 
 def replay(
-    learner: Learner, events: Iterable[Event], *, teacher: Teacher | None = None
+    learner: Learner, events: Iterable[Event], *, teacher: Teacher | None = None, exact: bool = True
 ) -> Generator[Episode, None, dict[int, BeforeMovement]]:
     """Let ``learner`` repeat ``events``. Nothing is executed, and no recorded request reaches a teacher.
 
@@ -37,6 +41,7 @@ def replay(
         events: events of the record.
         teacher: teacher freshly built, if it draws at random. Its ``offer`` is called before each movement, so that its
             draws go on as in the run; an offer must equal the recorded demonstration. None: nobody is asked.
+        exact: whether thetas must repeat, but for rounding; see ``repeats_exactly``. Goals must repeat anyway.
 
     Yields:
         Episodes, as `run` has yielded them.
@@ -100,11 +105,12 @@ def replay(
                         contexts[event.place] = event.context
                 moves = learner.ask_many(contexts)
                 for event in group:
-                    if _check_move(learner, event, index + event.place, moves[event.place]):
+                    if _check_move(learner, event, index + event.place, moves[event.place], exact):
                         assert event.theta is not None
                         learner.replace_theta(event.theta, place=event.place)
                         if not rounded:
-                            warnings.warn(_ROUNDED.format(index + event.place), RuntimeWarning, stacklevel=2)
+                            remark = (_ROUNDED if exact else _TRAINED_ELSEWHERE).format(index + event.place)
+                            warnings.warn(remark, RuntimeWarning, stacklevel=2)
                         rounded = True
                 if event.kind == Kind.INTERRUPTED:
                     learner.interrupt()
@@ -118,6 +124,16 @@ def replay(
                     preceding = before.pop(event.place, BeforeMovement())
                     yield Episode(index + event.place, context, moves[event.place], event.outcome, *preceding, failed)
     return before
+
+
+def repeats_exactly(about: Mapping[str, Any], learner: Learner) -> bool:
+    """Whether the forward model of a learner, if any, is trained as for the record that ``about`` describes.
+
+    Another device or processor rounds differently, so the model, and a search through it, differ a little.
+    """
+    versions, devices = about.get("versions", {}), {part.device for part in learner.problem.trained}
+    recorded = {made_by.get("device") for made_by in (versions, *versions.get("before", ()))} - {None}
+    return not devices or recorded <= devices
 
 
 def _together(events: Iterable[Event]) -> Iterator[list[Event]]:
@@ -146,11 +162,11 @@ def _unseen(event: Event) -> bool:
     return _failed(event) and event.theta is None
 
 
-def _check_move(learner: Learner, event: Event, index: int, move: Move | None) -> bool:
+def _check_move(learner: Learner, event: Event, index: int, move: Move | None, exact: bool) -> bool:
     """Refuse a learner that proposes another movement than the recorded one.
 
     Returns:
-        Whether the thetas differ by rounding.
+        Whether the thetas differ; if ``exact``, by rounding.
     """
     if move is None or event.theta is None:
         if move is not None or event.theta is not None:
@@ -160,7 +176,8 @@ def _check_move(learner: Learner, event: Event, index: int, move: Move | None) -
     problem = learner.problem
     if event.goal is not None:
         _check_repeats(problem.outcomes, index, "goal", event.goal, move.goal)
-    _check_repeats(problem.policies, index, "theta", event.theta, move.theta)
+    if exact:
+        _check_repeats(problem.policies, index, "theta", event.theta, move.theta)
     return not np.array_equal(event.theta, move.theta)
 
 

@@ -10,7 +10,7 @@ from sgimd_torch.learner import Learner
 from sgimd_torch.learner.events import Kind
 from sgimd_torch.parts import Teacher
 from sgimd_torch.record import Record, ReplayError, RunError
-from sgimd_torch.record.replay import replay
+from sgimd_torch.record.replay import repeats_exactly, replay
 from sgimd_torch.spaces import Episode, Move
 
 
@@ -74,4 +74,5 @@ def repeated(learner: Learner, path: str | os.PathLike[str], *, teacher: Teacher
         begun = record.about.get("begun", 0)
         if begun != learner.begun:
             raise ReplayError(f"{path} began with {begun} exemplars in memory, this learner began with {learner.begun}")
-        yield from replay(learner, record.events(), teacher=teacher)
+        exact = repeats_exactly(record.about, learner)
+        yield from replay(learner, record.events(), teacher=teacher, exact=exact)

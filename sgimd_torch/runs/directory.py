@@ -12,25 +12,28 @@ import os
 import platform
 import subprocess
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
 import sgimd_torch
 from sgimd_torch.environments.protocol import Environment, FromFiles
 from sgimd_torch.files import checksum, make_folder
-from sgimd_torch.options.build import RunParts
+from sgimd_torch.options.build import RunParts, build
 from sgimd_torch.options.catalogue import PLACES, WORDS, function_of
 from sgimd_torch.options.config import FILES, Config, differ, words
 from sgimd_torch.record import Dims, Record, RunError
+from sgimd_torch.runs.signals import say
 
 RUN_FILE: Final = "run.sqlite"
 THREADS: Final = "environment.threads"
+DEVICE: Final = "inverse.accelerator"
 # Settings in which runs may differ: they name, show or speed up a run.
-NOT_COMPARED: Final = ("seed", "out", "name", "board", THREADS)
+NOT_COMPARED: Final = ("seed", "out", "name", "board", THREADS, DEVICE)
 EVALUATES: Final = ("evaluated_by", "repeats", "floor_at", "benchmark_crc32")  # equal options of all evaluations
 MAY_CHANGE: Final = (
     *("movements", "until", "out", "name", "board", "failures", "evaluate_at"),
-    *(*FILES, *EVALUATES, THREADS),
+    *(*FILES, *EVALUATES, THREADS, DEVICE),
 )
 """Options that may change when a run is resumed, as they do not affect the learner. Files are compared by their
 checksums: the demonstrations must be equal, the benchmark may be another one."""
@@ -59,7 +62,7 @@ def open_run(parts: RunParts, *, resume: bool) -> tuple[Record, list[str]]:
     about: dict[str, Any] = {
         "settings": config.settings,
         "files": parts.data,
-        "versions": {**versions(forward=bool(parts.learner.problem.trained)), **sources(config, robot)},
+        "versions": versions_of(parts),
         "robot": type(robot).__name__,
         "words": words(config),
         "tolerance": parts.learner.problem.tolerance,
@@ -103,6 +106,26 @@ def with_found_earlier(config: Config) -> Config:
         return config  # it is another robot's run
     earlier = {name: before[name] for name in names & before.keys() if name not in dict(config.parts)}
     return Config.from_settings({**config.settings, **earlier})
+
+
+def build_again(config: Config, *, recorded: bool = True) -> RunParts:
+    """Build the parts of a run on disk; if this machine lacks the device that trained its model, the CPU trains it.
+
+    Args:
+        config: settings of the run.
+        recorded: whether the run is on disk. If not, a missing device is an error.
+
+    Raises:
+        ValueError, FileNotFoundError: see ``build``.
+    """
+    try:
+        return build(config)
+    except ValueError as error:
+        if not recorded or config.values.get(DEVICE, "auto") == "auto":
+            raise
+        parts = build(replace(config, parts={**dict(config.parts), DEVICE: "auto"}))
+        say(f"the CPU trains the forward model of this record: {error}")
+        return parts
 
 
 def _reopened(path: Path, about: dict[str, Any], dims: Dims, config: Config, notes: list[str]) -> Record:
@@ -171,12 +194,24 @@ def _refuse_other(record: Record, about: dict[str, Any], dims: Dims) -> set[str]
 def _with_earlier(old: dict[str, Any], now: dict[str, Any], notes: list[str]) -> dict[str, Any]:
     """The versions ``now``, and under "before" the different versions of earlier parts of the run."""
     earlier = old.pop("before", [])
-    differ = [name for name, version in now.items() if old.get(name) != version]
-    if differ:
-        changes = ", ".join(f"{name} {old.get(name)} -> {now[name]}" for name in differ)
+    if changes := changed_versions(old, now):
         notes.append(f"resumed with other versions: {changes}; only new movements and evaluations use them")
         earlier = [*earlier, old]
     return {**now, "before": earlier} if earlier else now
+
+
+def changed_versions(old: Mapping[str, Any], now: Mapping[str, Any]) -> str:
+    """The versions that differ, such as "torch 2.5.1 -> 2.6.0"; "" if none does."""
+    return ", ".join(
+        f"{name} {old.get(name)} -> {version}" for name, version in now.items() if old.get(name) != version
+    )
+
+
+def versions_of(parts: RunParts) -> dict[str, Any]:
+    """Versions of all that a run depends on, and the device that trains its forward model."""
+    trained = parts.learner.problem.trained
+    devices = [("device", part.device) for part in trained if part.device]
+    return {**versions(forward=bool(trained)), **dict(devices), **sources(parts.config, parts.environment)}
 
 
 def sources(config: Config, robot: Environment) -> dict[str, str]:

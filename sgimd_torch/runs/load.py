@@ -11,9 +11,9 @@ import os
 from pathlib import Path
 
 from sgimd_torch.learner import Learner
-from sgimd_torch.options.build import build
+from sgimd_torch.record import ReplayError
 from sgimd_torch.record.saving import repeated
-from sgimd_torch.runs.directory import RUN_FILE
+from sgimd_torch.runs.directory import RUN_FILE, build_again, changed_versions, versions_of
 from sgimd_torch.runs.read import config_of, read_run
 
 
@@ -50,7 +50,7 @@ class OpenRun:
 
     def __init__(self, path: str | os.PathLike[str], *, trust: bool = False) -> None:
         self.recorded = read_run(path)
-        self.parts = build(config_of(self.recorded, trust=trust))
+        self.parts = build_again(config_of(self.recorded, trust=trust))
         self._episodes = repeated(self.parts.learner, Path(path) / RUN_FILE)
 
     def replay(self, movements: int | None = None) -> None:
@@ -65,8 +65,12 @@ class OpenRun:
         last = math.inf if movements is None or movements >= len(self.recorded.index) else movements
         if learner.movements >= last:
             return
-        for episode in self._episodes:
-            for model in learner.problem.trained:
-                model.refresh(learner.memory)
-            if last <= learner.movements == episode.index + 1:
-                return
+        try:
+            for episode in self._episodes:
+                for model in learner.problem.trained:
+                    model.refresh(learner.memory)
+                if last <= learner.movements == episode.index + 1:
+                    return
+        except ReplayError as error:
+            changes = changed_versions(self.recorded.versions, versions_of(self.parts))
+            raise ReplayError(f"{error}{f' What differs: {changes}' * bool(changes)}") from error

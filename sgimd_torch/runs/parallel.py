@@ -5,6 +5,7 @@ failures = sweep([Config(seed=seed) for seed in range(20)], processes=4)
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -18,7 +19,7 @@ from typing import Final
 from sgimd_torch.files import make_folder
 from sgimd_torch.options.config import Config, words
 from sgimd_torch.runs.read import movements_on_disk
-from sgimd_torch.runs.signals import Failed, Progress, Stopped, Stopping
+from sgimd_torch.runs.signals import ONE_THREAD, Failed, Progress, Stopped, Stopping
 
 POLL: Final = 0.05  # s between two looks at the processes
 REFRESH: Final = 20  # looks at the processes between two looks at the movements on disk
@@ -86,10 +87,14 @@ def _start(config: Config) -> tuple[Process, int]:
     """The process of a run, and the length of its log before."""
     make_folder(config.directory.parent)
     command = [sys.executable, "-m", "sgimd_torch", "run", "--resume", *words(config)]
+    environment = {**os.environ, **ONE_THREAD}  # the processes share the cores
     with log_of(config).open("ab") as log:
         before = log.tell()
         # The run has its own process group: Ctrl-C reaches only this process, which passes it on.
-        return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=log, process_group=0), before
+        process = subprocess.Popen(
+            command, stdin=subprocess.DEVNULL, stdout=log, stderr=log, process_group=0, env=environment
+        )
+        return process, before
 
 
 def _wait(running: Mapping[Config, tuple[Process, int]], stopping: Stopping) -> list[Config]:

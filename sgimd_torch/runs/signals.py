@@ -23,6 +23,8 @@ from typing import Any, Final, Self, TextIO
 from sgimd_torch.options.signature import parsed
 
 REPORT_EVERY: Final = 20.0  # s between two lines of progress if stderr is no terminal
+ONE_THREAD: Final = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+"""Environment of a process for small matrices, for which several threads would be slower."""
 SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
 
 

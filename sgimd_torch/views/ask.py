@@ -23,7 +23,7 @@ import numpy as np
 
 from sgimd_torch.environments.motor_primitives import GaussianPrimitive
 from sgimd_torch.environments.protocol import primitive_of
-from sgimd_torch.files import write_text
+from sgimd_torch.files import check_writable, write_text
 from sgimd_torch.options.build import RunParts
 from sgimd_torch.options.signature import parsed
 from sgimd_torch.runs.load import OpenRun
@@ -43,6 +43,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     options = parser().parse_args(argv)
     run = OpenRun(options.run, trust=options.trust)
+    for path in filter(None, (options.out, options.trajectory)):
+        check_writable(path)
     run.replay()
     parts = run.parts
     box = parts.environment.outcomes

@@ -1,5 +1,6 @@
 """The forward model: what it learns, how sure it is, and what it refuses."""
 
+import os
 import pickle
 
 import numpy as np
@@ -110,11 +111,16 @@ def test_the_gradient_equals_finite_differences_and_is_finite_at_the_goal_itself
 
 def test_the_seed_says_what_is_learnt_and_torchs_own_generator_and_threads_are_left_alone():
     memory, before, threads = remembered(100), torch.random.get_rng_state(), torch.get_num_threads()
+    torch.set_num_threads(2)
     first, same, other = (weights(taught(memory, seed=seed)) for seed in (3, 3, 4))
     assert torch.equal(first, same)
     assert not torch.equal(first, other)
     assert torch.equal(torch.random.get_rng_state(), before)
-    assert torch.get_num_threads() == threads
+    within, model = list[int](), taught(memory)
+    model.before_learning.append(lambda *_: within.append(torch.get_num_threads()))
+    model.refresh(remembered(200))
+    assert (within, torch.get_num_threads()) == ([1], 2)
+    torch.set_num_threads(threads)
 
 
 def test_a_refresh_waits_for_enough_new_exemplars_and_a_first_effect():
@@ -199,12 +205,20 @@ def test_a_refresh_that_is_interrupted_has_changed_nothing(monkeypatch):
     assert ForwardModel(0, 3, 2).relative_error == np.inf
 
 
-@pytest.mark.skipif(torch.cuda.is_available(), reason="there is a GPU")
-def test_a_model_for_a_missing_gpu_says_so_and_stays_untrained():
-    model = ForwardModel(0, 3, 2, accelerator="cuda")
-    with pytest.raises(Exception, match="CUDA"):
-        model.refresh(remembered(100))
-    assert not model.trained
+@pytest.mark.parametrize(
+    "launcher",
+    [
+        {"SLURM_NTASKS": "4"},
+        {"LT_CLI_USED": "1", "LT_DEVICES": "2"},
+        {"LT_ACCELERATOR": "cuda"},
+        {"LT_STRATEGY": "ddp"},
+    ],
+)
+def test_no_launcher_decides_how_the_model_is_trained(monkeypatch, launcher):
+    for name, value in launcher.items():
+        monkeypatch.setenv(name, value)
+    assert torch.equal(weights(taught(remembered(100))), weights(taught(remembered(100), accelerator="cpu")))
+    assert launcher.items() <= os.environ.items()
 
 
 def test_a_copy_for_another_process_predicts_the_same_and_learns_on(model, unseen):
@@ -227,6 +241,8 @@ def untaught(**options):
         (lambda model: model.refresh(remembered(60)), "another run's"),
         (lambda model: model.predict(NO_CONTEXT, np.zeros(2)), "thetas"),
         (lambda model: untaught(members=0), "members"),
+        (lambda model: untaught(accelerator="tpu"), r"auto or cpu.*, got 'tpu'; is it meant for another machine"),
+        (lambda model: untaught(accelerator="cpi"), "did you mean cpu"),
         (lambda model: untaught(every=0), "every"),
         (lambda model: untaught(every=2.5), "every"),
         *((lambda model, value=value: untaught(rate=value), "rate") for value in (0.0, np.nan, np.inf)),

@@ -1,14 +1,17 @@
 """Runs with a forward model: what they record and report, what they refuse, and that a stop leaves no trace."""
 
 import importlib
+import os
 import re
+import shutil
+import subprocess
 import sys
 
 import numpy as np
 import pytest
 
 from boards import curves_of
-from runs import content_of
+from runs import ROOT, about_of, content_of, write_about
 from sgimd_torch.board.legend import LEGEND
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import Benchmark, save_benchmark
@@ -18,8 +21,9 @@ from sgimd_torch.memory import Memory
 from sgimd_torch.options.build import build
 from sgimd_torch.options.command_line import main
 from sgimd_torch.options.config import Config
-from sgimd_torch.record import Record, layout
+from sgimd_torch.record import Record, ReplayError, layout
 from sgimd_torch.runs.directory import RUN_FILE
+from sgimd_torch.runs.load import load_learner
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.run import Seconds
 from sgimd_torch.runs.signals import command
@@ -92,6 +96,66 @@ def test_a_run_made_longer_equals_a_long_run_and_so_does_its_board(tmp_path, liv
     resumed, whole = curves_of(directory), curves_of(reference)
     assert {tag for tag in whole if tag.startswith("model/")} == TAGS
     assert {tag: resumed[tag] for tag in TAGS} == {tag: whole[tag] for tag in TAGS}
+
+
+MISSING = ("--inverse.accelerator", "tpu")
+
+
+def test_a_missing_device_is_refused_before_the_first_movement(tmp_path, capsys):
+    words = ["--environment", "planar-arm-7", "--inverse", "model", *MISSING, "--out", str(tmp_path / "runs")]
+    assert command(main, words) == 2
+    assert "error: accelerator must be auto or cpu" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.fixture
+def elsewhere(tmp_path, reference):
+    """Folder of the reference, as another machine would have made it: a function of its device and other settings."""
+
+    def elsewhere(device, **settings):
+        directory = shutil.copytree(reference, tmp_path / reference.parent.name / reference.name)
+        about = about_of(directory)
+        settings = {**about["settings"], "inverse.accelerator": "tpu", **settings}
+        write_about(directory, settings=settings, versions={**about["versions"], "device": device})
+        return directory
+
+    return elsewhere
+
+
+def test_a_record_of_a_missing_device_is_loaded_and_resumed_here_and_says_so(tmp_path, live, elsewhere, capsys):
+    directory = elsewhere("tpu")
+    assert load_learner(directory).movements == MOVEMENTS
+    assert "the CPU trains the forward model of this record: accelerator must be" in capsys.readouterr().err
+    live(tmp_path, *MODEL, *MISSING, "--board", "true", "--movements", MOVEMENTS + 1, "--resume")
+    said = capsys.readouterr().err
+    assert "the CPU trains the forward model of this record" in said
+    assert f"device tpu -> {about_of(directory)['versions']['device']}" in said
+    assert len(read_run(directory).index) == MOVEMENTS + 1
+
+
+def test_a_model_that_was_trained_elsewhere_may_differ_and_the_recorded_movements_count(elsewhere, reference):
+    with pytest.warns(RuntimeWarning, match="another device or processor trained the forward model"):
+        learner = load_learner(elsewhere("tpu", **{"inverse.rate": 1.9}))  # another rounding, exaggerated
+    np.testing.assert_array_equal(learner.memory.thetas, load_learner(reference).memory.thetas)
+
+
+def test_a_model_that_differs_on_the_same_device_is_refused_with_what_differs(elsewhere, reference):
+    directory = elsewhere("tpu", **{"inverse.rate": 1.9})
+    write_about(directory, versions={**about_of(reference)["versions"], "torch": "2.0"})
+    with pytest.raises(ReplayError, match=r"another theta.* What differs: torch 2\.0 -> "):
+        load_learner(directory)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("algorithm", ["practice", "sgim-d"])
+def test_the_number_of_threads_does_not_change_a_life(tmp_path, algorithm):
+    short = f"run --algorithm {algorithm} --movements 600 --evaluate-at [] --inverse model-alone --search gradient"
+    for threads in "12":
+        chosen = {f"{library}_NUM_THREADS": threads for library in ("OMP", "OPENBLAS", "MKL")}
+        words = [sys.executable, "-m", "sgimd_torch", *short.split(), "--out", tmp_path / threads]
+        subprocess.run(words, check=True, env={**os.environ, "PYTHONPATH": str(ROOT), **chosen})
+    one, two = (content_of(tmp_path / threads / algorithm / "seed-000") for threads in "12")
+    assert one == two
 
 
 def test_without_its_packages_the_model_says_what_to_install(monkeypatch):

@@ -90,7 +90,7 @@ print(json.dumps({name: getattr(module, "__file__", None) or "" for name, module
 """
 
 
-@pytest.mark.parametrize(("program", "database", "most"), [(LEARN, False, 5040), (COMMAND, True, 7900)])
+@pytest.mark.parametrize(("program", "database", "most"), [(LEARN, False, 5040), (COMMAND, True, 7940)])
 def test_learning_loads_few_lines_of_ours_and_no_database(tmp_path, monkeypatch, program, database, most):
     monkeypatch.setenv("PYTHONPATH", str(PACKAGE.parent))
     words = [sys.executable, "-c", program + LOADED]

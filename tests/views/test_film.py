@@ -155,6 +155,12 @@ def test_an_interrupted_film_leaves_the_old_one_and_nothing_else(tmp_path):
     assert [path.read_text() for path in tmp_path.iterdir()] == ["old"]
 
 
+def test_without_ffmpeg_nothing_is_replayed(run_path, tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", str(tmp_path / "none"))
+    assert command(film.main, [str(run_path), "--out", str(tmp_path / "film.mp4")]) == 2
+    assert "films need the program ffmpeg" in capsys.readouterr().err
+
+
 def filmed(run_path, gl, *options):
     """In another process, since MuJoCo chooses how to draw when it is imported."""
     return subprocess.run(

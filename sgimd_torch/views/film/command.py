@@ -33,7 +33,7 @@ from sgimd_torch.runs.load import OpenRun
 from sgimd_torch.runs.read import Run
 from sgimd_torch.runs.signals import parser_of, say
 from sgimd_torch.spaces import Array, stream
-from sgimd_torch.views.film.reel import RATES, Painter, Shot, shoot, write_film
+from sgimd_torch.views.film.reel import RATES, Painter, Shot, check_film, shoot, write_film
 from sgimd_torch.views.film.sketch import Sketchbook, panel
 
 EXAMPLES = """examples:
@@ -68,6 +68,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     stages, contexts = _stages(recorded, options), parts.environment.contexts
     middle = (contexts.low + contexts.high) / 2
     context = contexts.check("--context", middle if options.context is None else options.context)
+    check_film(options.out)
+    policies = parts.environment.policies
+    recording = parts.task.picture(context, (policies.low + policies.high) / 2, stream(0, "film"))
+    if not isinstance(recording, Sketch):  # a sketch can be drawn without OpenGL
+        with _painter(parts.environment, [Shot(recording, goals[0])]):
+            pass
     shots, stages = _cast(run, goals, context, stages)
     with _painter(parts.environment, shots) as painter:
         rate = RATES[options.out.suffix]

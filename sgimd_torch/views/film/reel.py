@@ -8,6 +8,7 @@ Needs the extra ``film``.
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
@@ -22,7 +23,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from sgimd_torch.environments.sketch import Sketch
-from sgimd_torch.files import replacing
+from sgimd_torch.files import check_writable, replacing
 from sgimd_torch.spaces import Array
 
 if TYPE_CHECKING:
@@ -108,6 +109,19 @@ def captioned(image: Image.Image, title: str, caption: str) -> Frame:
             pen.rectangle((left - margin, top - margin / 2, right + margin, bottom + margin / 2), (15, 30, 45, 190))
             pen.text((2 * margin, y), text, "white", font, anchor)
     return np.asarray(image)
+
+
+def check_film(path: Path) -> None:
+    """Refuse a film that could not be written, before a learner repeats its record.
+
+    Raises:
+        OSError: ``path`` cannot be written, or there is no encoder.
+    """
+    check_writable(path)
+    with suppress(RuntimeError):
+        if shutil.which(get_ffmpeg_exe()):
+            return
+    raise OSError("films need the program ffmpeg; install imageio-ffmpeg, or does IMAGEIO_FFMPEG_EXE name no program?")
 
 
 def write_film(path: Path, frames: Iterable[Frame]) -> None:

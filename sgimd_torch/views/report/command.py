@@ -13,7 +13,7 @@ from pathlib import Path
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from sgimd_torch.evaluation import RECENT
-from sgimd_torch.files import write_text
+from sgimd_torch.files import check_writable, write_text
 from sgimd_torch.record import RunError
 from sgimd_torch.runs.signals import parser_of
 from sgimd_torch.views.report import figures, provenance
@@ -41,6 +41,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if options.out is not None and (out.is_dir() or not out.parent.is_dir()):  # before any work
         raise RunError(f"--out must be a file in a folder that exists, got {out}")
     variants = best_first(Variant(name, runs) for name, runs in read_runs(options.runs).items())
+    check_writable(out)
     write_text(out, page(options.runs, variants, options.baseline))
     print(out)
     return 0
