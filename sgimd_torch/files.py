@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import lzma
+import math
 import os
 import stat
 import tokenize
@@ -28,6 +29,8 @@ _UNREADABLE: Final = (
     *(ValueError, TypeError, AttributeError, OSError, EOFError, RuntimeError, MemoryError, OverflowError),
     *(SyntaxError, tokenize.TokenError, zipfile.BadZipFile, zlib.error, lzma.LZMAError),
 )
+_LARGE: Final = 2**28  # bytes that any file may take
+_DENSE: Final = 100  # bytes that each byte of a larger file may take
 
 
 def check_regular(path: str | os.PathLike[str]) -> None:
@@ -39,6 +42,16 @@ def check_regular(path: str | os.PathLike[str]) -> None:
     mode = os.stat(path).st_mode
     if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
         raise OSError(f"{path} is a pipe or a device, not a file")
+
+
+def check_density(n_bytes: int, path: str | os.PathLike[str]) -> None:
+    """Refuse a file before its content takes ``n_bytes`` of memory, if the file is far too small for them.
+
+    Raises:
+        ValueError: the content would take more than 256 MB, and more than 100 times the size of the file.
+    """
+    if n_bytes > max(_LARGE, _DENSE * os.path.getsize(path)):
+        raise ValueError(f"it would take {n_bytes} bytes of memory, far more than the {os.path.getsize(path)} it has")
 
 
 @contextmanager
@@ -122,10 +135,8 @@ def read_npz(path: str | os.PathLike[str], kind: str, writer: str, names: Sequen
             with zipfile.ZipFile(file) as stored:
                 known = {info.filename: info for info in stored.infolist()}
                 wanted = {name: known[f"{name}.npy"] for name in names if f"{name}.npy" in known}
-                arrays = dict[str, Stored]()
-                for name, info in wanted.items():
-                    with stored.open(info) as member:
-                        arrays[name] = np.asarray(np.lib.format.read_array(member, allow_pickle=False))
+                check_density(sum(info.file_size for info in wanted.values()), path)
+                arrays = {name: _array(stored, info) for name, info in wanted.items()}
             for array in arrays.values():
                 array.flags.writeable = False
         except _UNREADABLE as error:  # numpy's own message advises allow_pickle=True, which is unsafe
@@ -133,6 +144,17 @@ def read_npz(path: str | os.PathLike[str], kind: str, writer: str, names: Sequen
     if missing := [name for name in names if name not in arrays]:
         raise refused(f"it lacks {', '.join(missing)}")
     return [arrays[name] for name in names]
+
+
+def _array(stored: zipfile.ZipFile, info: zipfile.ZipInfo) -> Stored:
+    """An array of an npz file, if it is as long as its header says."""
+    with stored.open(info) as member:
+        head = np.lib.format.read_array_header_1_0 if np.lib.format.read_magic(member) == (1, 0) else None
+        shape, _, kind = (head or np.lib.format.read_array_header_2_0)(member)
+        if math.prod(shape) * kind.itemsize != info.file_size - member.tell():
+            raise ValueError(f"{info.filename} has not as many numbers as it says")
+    with stored.open(info) as member:
+        return np.asarray(np.lib.format.read_array(member, allow_pickle=False))
 
 
 def checksum(path: Path) -> str:

@@ -35,6 +35,12 @@ def zipped(**members):
     return buffer.getvalue()
 
 
+def dense(**arrays):
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, **arrays)
+    return buffer.getvalue()
+
+
 def headed(shape, dtype="<f8"):
     """An npy file of 48 bytes that says that it is of this shape."""
     text = f"{{'descr': '{dtype}', 'fortran_order': False, 'shape': {shape}, }}\n".encode()
@@ -67,6 +73,13 @@ def test_what_holds_no_such_array_is_refused_by_name(tmp_path, content):
     path.write_bytes(content)
     with pytest.raises(ValueError, match=r"file\.npz is no list: .*; was it written by a test, and whole"):
         read_npz(path, "list", "a test", ("numbers",))
+
+
+def test_few_bytes_never_take_much_memory(tmp_path):
+    """Each array is small enough, together they are not."""
+    (tmp_path / "file.npz").write_bytes(dense(numbers=np.zeros(2**24), more=np.zeros(2**24)))
+    with pytest.raises(ValueError, match=r"file\.npz is no list: .*; was it written by a test, and whole"):
+        read_npz(tmp_path / "file.npz", "list", "a test", ("numbers", "more"))
 
 
 def test_what_is_written_is_read_and_cannot_be_changed(tmp_path):

@@ -22,7 +22,7 @@ import numpy as np
 
 from sgimd_torch.demonstrations.columns import ColumnNames, Recording, Table, recordings_of
 from sgimd_torch.demonstrations.text import POINTER
-from sgimd_torch.files import check_regular
+from sgimd_torch.files import check_density, check_regular
 
 try:
     import pyarrow
@@ -134,6 +134,7 @@ def _columns(file: Path, names: list[str]) -> dict[str, np.ndarray]:
         for chunk in chunks:
             if chunk.physical_type not in _NUMBERS:  # few bytes may stand for any number of long texts
                 raise ValueError(f"{chunk.path_in_schema} has {chunk.physical_type}, no numbers")
+        check_density(sum(8 * chunk.num_values for chunk in chunks), file)
         table = pyarrow.parquet.read_table(file, columns=names, page_checksum_verification=True)
         return {name: np.array(table.column(name).to_pylist()) for name in names}
     # ValueError: vectors differ in length.

@@ -359,6 +359,9 @@ HARMS = {
     r"be read: timestamp has BYTE_ARRAY, no numbers": lambda root: rewrite(root, "timestamp", ["late"] * 5),
     r"row \d+: timestamp must be finite": lambda root: rewrite(root, "timestamp", [0.0, None, 2, 3, 4]),
     "cannot be read: setting an array": lambda root: rewrite(root, STATE, [[[0.0, 1.0], [1.0]]] * 5),
+    r"cannot be read: it would take \d+ bytes": lambda root: pq.write_table(
+        pa.table({"timestamp": np.zeros(2**25 + 1, np.int8)}), last(root)
+    ),
     r"state\.list\.element has BOOLEAN, no numbers": lambda root: rewrite(root, STATE, [[True] * 3] * 5),
     r"\.parquet is a pointer of Git LFS, .*; git lfs pull gets": lambda root: last(root).write_text(POINTER),
 }
