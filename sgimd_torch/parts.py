@@ -248,7 +248,6 @@ class Teacher(Built):
     """
 
     needs_demonstrations: ClassVar[bool] = True
-
     who: str = "teacher"
 
     @abstractmethod

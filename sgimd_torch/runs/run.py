@@ -8,11 +8,11 @@ from __future__ import annotations
 import math
 import time
 import traceback
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import partial
-from typing import Any, Final, Protocol, Self
+from typing import Final, Protocol, Self, runtime_checkable
 
 from sgimd_torch.environments.protocol import FAILURES, SimulationError, reason_of
 from sgimd_torch.evaluation import Evaluation
@@ -87,8 +87,9 @@ class RunLoop:
         self.seconds = Seconds(self.record.about.get("seconds", {}))
         self.evaluations = Evaluations(parts, self.record)
         parts.learner.listeners.append(self._hear)
-        trained: Sequence[Any] = parts.learner.problem.trained
-        self.listeners: list[Listener] = [part.listener(self) for part in trained if hasattr(part, "listener")]
+        self.listeners: list[Listener] = [
+            part.listener(self) for part in parts.learner.problem.trained if isinstance(part, Listening)
+        ]
         if parts.config.board:
             from sgimd_torch.board.listener import BoardListener  # loaded here, as most runs have no board
 
@@ -290,6 +291,14 @@ class Listener(Protocol):
     def close(self) -> None:
         """The run has ended, or was stopped."""
         return
+
+
+@runtime_checkable
+class Listening(Protocol):
+    """A trained part of a learner that has a listener in a run."""
+
+    def listener(self, loop: RunLoop) -> Listener:
+        """The listener in the run ``loop``."""
 
 
 class Seconds:

@@ -70,7 +70,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     context = contexts.check("--context", middle if options.context is None else options.context)
     check_film(options.out)
     policies = parts.environment.policies
-    recording = parts.task.picture(context, (policies.low + policies.high) / 2, stream(0, "film"))
+    recording = traced(parts.environment, context, (policies.low + policies.high) / 2, stream(0, "film"))
     if not isinstance(recording, Sketch):  # a sketch can be drawn without OpenGL
         with _painter(parts.environment, [Shot(recording, goals[0])]):
             pass
