@@ -57,7 +57,7 @@ class StrategicBabbling(ThroughBabbling):
         """Movements by one strategy for one goal; if the teacher has no reply, the movements are autonomous.
 
         Deviation: competence is measured only at the goal and at the demonstrated outcome. The papers measure it at
-        every outcome of the attempt. By this, a teacher whose demonstrations miss the requested goal would look good.
+        every outcome of the attempt; then a teacher whose demonstrations miss the requested goal would look good.
         """
         strategy, goal = self.goals.choose(context, self.costs)
         if strategy == AUTONOMOUS:
@@ -77,7 +77,7 @@ class StrategicBabbling(ThroughBabbling):
         competence_before_d = self.babbling.competence(context, outcome_d)
         try:
             yield from recording_outcomes(social.attempt(context, *lesson), executed)
-        finally:  # also if another demonstration interrupts
+        finally:  # also if another demonstration interrupts the imitation
             outcomes = [outcome for _, outcome in executed]
             self.babbling.report_competence(context, goal, outcomes, competence_before, strategy)
             if self.problem.outcomes.contains(outcome_d):

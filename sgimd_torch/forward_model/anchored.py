@@ -1,8 +1,9 @@
 """Anchored predictions of the forward model, corrected by its errors at similar executed movements, the anchors.
 
-Not in Nguyen & Oudeyer (2014). With one anchor k the prediction is tau_k + L(theta) - L(theta_k). With many anchors, a
-Gaussian process fitted to the network's errors at the anchors is added to L(theta); its variance grows far from
-anchors. Networks are wrong where few movements were executed; without this variance a search would end there.
+Not in Nguyen & Oudeyer (2014). L is the mean of the networks. Near an anchor k the prediction is about
+tau_k + L(theta) - L(theta_k): a Gaussian process fitted to the errors of L at the anchors is added to L(theta). Its
+variance grows far from anchors. Networks are wrong where few movements were executed; without this variance a search
+would end there.
     near = Anchored(model, policies, context, ...); thetas = near.best(starts, goals, steps=40, step=0.005)
 """
 
@@ -67,19 +68,19 @@ class Anchored:
         weighted sum of noise, disagreement between members, and variance of the process."""
         means, variances = self.model.landing(self.context, theta)
         landing = means.mean(dim=0)
-        spread = _SHARE * (variances.mean(dim=0) + means.var(dim=0, correction=0)).sum(dim=-1)
+        known_variance = _SHARE * (variances.mean(dim=0) + means.var(dim=0, correction=0)).sum(dim=-1)
         scaled = theta / self.sides
         squares = (scaled**2).sum(dim=-1, keepdim=True) + self._squares - 2 * (self._scaled @ scaled[..., None])[..., 0]
         kernel = self._prior_variance * self._kernel(squares)  # (n, m)
         correction = (kernel[:, None] @ self._weights)[:, 0]
         explained = ((kernel[:, None] @ self._precision)[:, 0] * kernel).sum(dim=-1)
         variance = (self._prior_variance[:, 0] - explained).clamp(min=0)
-        return landing + correction, spread + landing.shape[-1] * _CAUTION * variance
+        return landing + correction, known_variance + landing.shape[-1] * _CAUTION * variance
 
     def expected(self, theta: torch.Tensor, goals: torch.Tensor) -> torch.Tensor:
         """Squared distances ``(n,)`` of expected outcomes from ``goals``, plus the variances of the outcomes."""
-        landing, spread = self.predict(theta)
-        return ((landing - goals) ** 2).sum(dim=-1) + spread
+        landing, variance = self.predict(theta)
+        return ((landing - goals) ** 2).sum(dim=-1) + variance
 
     def descend(
         self, theta: torch.Tensor, goals: torch.Tensor, *, steps: int, step: float, radius: float | None = None

@@ -62,7 +62,7 @@ class ModelBased(Inverse):
         model: forward model.
     """
 
-    says_how_sure = False
+    says_how_sure = False  # its estimates have no standard deviation
 
     @with_keywords_of(model_of)
     def __init__(self, problem: Problem, **options: Any) -> None:

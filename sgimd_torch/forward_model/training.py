@@ -85,7 +85,7 @@ class OnlineTrainer:
         Args:
             x: ``(n, n_inputs)`` standardised inputs, the newest last, on the device of the ensemble.
             y: ``(n, n_outputs)`` standardised outputs.
-            scale: ``(n_outputs,)`` factors that turn outputs into lengths.
+            scale: ``(n_outputs,)`` factors that turn outputs into the unit of outcomes.
             steps: largest number of steps of the optimiser, at least 1.
             give_up: relative error above which the fit has diverged. A fit with a loss that is not finite has diverged,
                 too.

@@ -35,8 +35,8 @@ Output = TypeVar("Output")
 
 
 def one_thread(function: Callable[Inputs, Output]) -> Callable[Inputs, Output]:
-    """Decorator: linear algebra in one thread. For these small matrices several threads are slower: on two cores a run
-    of `practice` would take twice as long, on sixteen far longer."""
+    """Decorator: linear algebra in one thread. For these small matrices several threads are slower: on two cores a life
+    of the learner `practice` would take twice as long, on sixteen far longer."""
     limited: Callable[Inputs, Output] = _BLAS.wrap(limits=1, user_api="blas")(function)
     return limited
 
@@ -69,7 +69,7 @@ def fit_lengths(inputs: Array, outcomes: Array) -> Array:
 
     def loss(parameters: Array) -> tuple[float, Array]:
         scaled, noise = transposed * np.exp(-parameters[:dim, None]), float(np.exp(parameters[dim]))
-        covariance, slopes = kernels.covariance_matrix(scaled, _SMOOTH)
+        covariance, slopes = kernels.covariance_matrix(scaled, _SMOOTH)  # slopes: its derivatives by inputs
         covariance.flat[:: len(inputs) + 1] += noise
         # The lower half of an array of C is the upper half of an array of Fortran.
         factor, failed = dpotrf(covariance.T, lower=False, overwrite_a=True)
@@ -80,10 +80,10 @@ def fit_lengths(inputs: Array, outcomes: Array) -> Array:
         inverse, _ = dpotri(factor, lower=False, overwrite_c=True)
         variance = (deviations * weights).mean()
         by_lengths, by_noise = kernels.gradient(scaled, inverse.T, np.ascontiguousarray(weights.T), slopes, variance)
-        deviation = (parameters[:dim] - guess) / 1.5
-        likelihood = 0.5 * deviations.size * np.log(variance) + deviations.shape[1] * half_log_determinant
-        value = float(likelihood + 0.5 * (deviation * deviation).sum())
-        return value, np.append(by_lengths + deviation / 1.5, noise * by_noise)
+        from_guess = (parameters[:dim] - guess) / 1.5
+        cost = 0.5 * deviations.size * np.log(variance) + deviations.shape[1] * half_log_determinant
+        value = float(cost + 0.5 * (from_guess * from_guess).sum())
+        return value, np.append(by_lengths + from_guess / 1.5, noise * by_noise)
 
     bounds = [(guess - 5, guess + np.log(2))] * dim + [(np.log(_LEAST_NOISE), np.log(3))]
     start = np.append(np.full(dim, guess), np.log(0.05))

@@ -64,5 +64,5 @@ class RobotSlot:
         return Event(Kind.ASKED, self.context, goal=goal, who=who, strategy=strategy, reply=reply, place=self.number)
 
     def moved(self, kind: Kind, move: Move, outcome: Array | None = None, reply: str | None = None) -> Event:
-        """Event of a movement and what came of it."""
+        """Event of a movement, with the ``origin`` of its proposal, and its outcome, or why it failed as ``reply``."""
         return Event(kind, self.context, move.theta, move.goal, outcome, move.origin, reply=reply, place=self.number)
