@@ -68,8 +68,8 @@ simplex: movements outside of Pi | searches/simplex.py | searches/test_search.py
     policies.clip(self.rng.normal(theta, noise * policies.sides) if noise ==> (theta + 9 if noise
 gradient search: errors at anchors are added | forward_model/anchored.py | forward_model/test_anchored.py
     return landing + correction, ==> return landing - correction,
-gradient search: no penalty of the spread | forward_model/anchored.py | forward_model/test_anchored.py
-    ((landing - goals) ** 2).sum(dim=-1) + spread ==> ((landing - goals) ** 2).sum(dim=-1) + 0 * spread
+gradient search: no penalty of the variance | forward_model/anchored.py | forward_model/test_anchored.py
+    ((landing - goals) ** 2).sum(dim=-1) + variance ==> ((landing - goals) ** 2).sum(dim=-1) + 0 * variance
 training: noise weighs twice in the loss | forward_model/ensemble.py | forward_model/test_ensemble.py
     0.5 * (log_variance + ==> 0.5 * (2 * log_variance +
 training on held-out exemplars | forward_model/training.py | forward_model/test_forward_model.py
