@@ -62,6 +62,7 @@ command      views.demonstrations       demonstrations
 command      views.benchmark            benchmark
 command      views.table                table
 command      views.report.command       report
+command      views.report.paper         paper
 command      teach.command              teach
 command      views.film.command         film
 command      views.ask                  ask
