@@ -139,6 +139,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     importing = options.command == "import"
     if options.command != "check" and options.out.suffix != ".npz":
         raise ValueError(f"--out must end in .npz, got {options.out}")
+    if options.command != "record":
+        check_regular(options.source)
     task = None
     if options.environment:
         task = task_of(parse([f"--environment={options.environment}", *of_robot])[0])
@@ -148,7 +150,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         assert task is not None
         record_led(task, options.out)
         return 0
-    check_regular(options.source)
     recordings = read_recordings(options, primitive_of(task.environment).ranges if task else None)
     if task is not None:
         recordings = _on_robot(task, recordings, options.source)
