@@ -19,9 +19,9 @@ SMALLER = {
     "--environment lerobot ...": "--environment table:bench {}",
     "--environment lerobot --environment.robot so101_follower": "--environment table:bench",
     "--environment.port /dev/ttyACM0": "",
-    "--movements 1000": "--movements 60",
-    "--movements 100": "--movements 8",
-    "--movements 30": "--movements 4",
+    "--movements 1000": "--movements 30",
+    "--movements 100": "--movements 4",
+    "--movements 30": "--movements 2",
     "--execute": "--execute --trust",
 }
 CAMERA = ROOT / "docs/how-to/camera.py"
