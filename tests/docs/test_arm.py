@@ -9,17 +9,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from arms import on_table, write
 from sgimd_torch.__main__ import _call
 from sgimd_torch.runs.signals import command
-from table import on_table, write
 
 SO101 = ("shoulder_pan", "shoulder_lift", "elbow_flex")
 ROOT = Path(__file__).parents[2]
 SMALLER = {
-    "--environment lerobot ...": "--environment table:bench {}",
-    "--environment lerobot --environment.robot so101_follower": "--environment table:bench",
+    "--environment lerobot ...": "--environment arms:bench {}",
+    "--environment lerobot --environment.robot so101_follower": "--environment arms:bench",
     "--environment.port /dev/ttyACM0": "",
-    "--movements 1000": "--movements 30",
+    "--movements 1000": "--movements 40",
     "--movements 100": "--movements 4",
     "--movements 30": "--movements 2",
     "--execute": "--execute --trust",

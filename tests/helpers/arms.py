@@ -165,7 +165,7 @@ def on_table(path, built=None, *, of_arm=(), **options):
 @with_keywords_of(LeRobotArm)
 def bench(**options):
     """The arm that lies on the table, by the options of the command line."""
-    return LeRobotArm(**{**options, "robot": "table:make", "clock": LIVE[-1].clock})
+    return LeRobotArm(**{**options, "robot": "arms:make", "clock": LIVE[-1].clock})
 
 
 def interrupt():
