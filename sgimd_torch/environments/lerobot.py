@@ -265,7 +265,7 @@ class LeRobotArm:
             if row <= moving or not np.allclose(self._command, commands[-1], atol=1e-6):
                 away_at = now
             due = max(due + 1 / self.rate, clock.monotonic())
-            clock.sleep(due - clock.monotonic())
+            clock.sleep(max(0.0, due - clock.monotonic()))  # time passes between two looks at a clock
             if now - away_at >= self.settle:
                 break
         self._check_heat()
