@@ -14,12 +14,13 @@ from xml.etree import ElementTree
 import mujoco
 import numpy as np
 
+from sgimd_torch.environments.mujoco_look import listed
 from sgimd_torch.environments.mujoco_model import UNITS, joint_of, pulled
-from sgimd_torch.environments.mujoco_posture import movable, nearest_posture, outside_ranges, touching
+from sgimd_torch.environments.mujoco_posture import movable, nearest_posture, touching, within_ranges
 from sgimd_torch.environments.mujoco_servos import joints_to_serve, serve
 from sgimd_torch.files import check_regular
 from sgimd_torch.options.catalogue import unknown_name_error
-from sgimd_torch.spaces import Array, check_point
+from sgimd_torch.spaces import check_point
 
 SERVOS: Final = ("auto", "file", "made")
 _HOMES: Final = ("home", "rest")  # names of keyframes in which movements begin unless another one is chosen
@@ -92,16 +93,19 @@ def load_model(
             for k, element in enumerate(kind):
                 element.name = element.name or f"unnamed_{k}"
         spec.compiler.fusestatic = False  # else links on fixed joints of a URDF, such as its tool, lose their names
-        model, alone = spec.compile(), _is_urdf(path)
+        model, root = spec.compile(), ElementTree.parse(path).getroot()
+        alone, limits = root.tag == "robot", [(joint, joint.find("limit")) for joint in root.iter("joint")]
+        # MuJoCo does not read the speeds of a URDF.
+        speeds = {
+            joint.get("name", ""): float(limit.get("velocity", 0)) for joint, limit in limits if limit is not None
+        }
         if served := joints_to_serve(model, servos, joints, alone=alone):
-            names, mocaps = [model.joint(k).name for k in served], len(pulled(model))
-            cause = "motors in place of position servos" if model.nu else "no actuators"
+            cause, held = "motors that are no servos" if model.nu else "no actuators", len(pulled(model))
             model, accelerations = serve(spec, model, served)
-            remarks.append(
-                f"{path.name} has {cause}: position servos were made for {', '.join(names)}"
-                + f"; {mocaps - len(pulled(model))} constraints to mocap bodies, which would hold the arm, were left out"
-                * (len(pulled(model)) < mocaps)
-            )
+            names = ", ".join(model.joint(k).name for k in served)
+            remarks.append(f"{path.name} has {cause}: position servos were made for {names}")
+            if held > len(pulled(model)):
+                remarks.append("constraints to mocap bodies, which would hold the arm, were left out")
         arm = [joint for k in range(model.nu) if (joint := joint_of(model, k)) is not None]
         arm = sorted({joint for joint in arm if int(model.jnt_type[joint]) in UNITS})
         bodies = _robot(model, arm, alone=alone)
@@ -114,14 +118,16 @@ def load_model(
         mujoco.mj_forward(model, data)
         resting = {pair for pair in touching(model, data, bodies) if pair[0]}
         if resting:
-            names = [" and ".join(model.body(body).name for body in pair) for pair in sorted(resting)]
-            remarks += [f"contacts in the start posture are left out: {', '.join(names)}"] if not posture else []
+            links = listed([" and ".join(model.body(body).name for body in pair) for pair in sorted(resting)])
+            remarks += [f"contacts in the start posture are left out: {links}"] if not posture else []
             again = _without(spec, model, resting)
             renewed = mujoco.MjData(again)
             mujoco.mj_copyState(again, data, renewed, int(mujoco.mjtState.mjSTATE_INTEGRATION))
             model, data = again, renewed
         kept = tuple(float(x) for x in data.qpos[model.jnt_qposadr[movable(model)]])
-        return Loaded(model, data, kept, _speeds(path), accelerations, remarks)
+        return Loaded(
+            model, data, kept, {name: speed for name, speed in speeds.items() if speed > 0}, accelerations, remarks
+        )
     except ValueError as error:
         raise ValueError(f"{path.name} cannot be used: {_with_advice(' '.join(str(error).split()), path)}") from error
 
@@ -146,17 +152,17 @@ def _begin(model: mujoco.MjModel, keyframe: str, file: str) -> mujoco.MjData:
 
 def _take_posture(model: mujoco.MjModel, data: mujoco.MjData, arm: Sequence[int], bodies: Sequence[int]) -> list[str]:
     """Put the nearest posture within all ranges and without contacts of the robot with itself into ``data``."""
-    mujoco.mj_forward(model, data)
-    outside, touched = outside_ranges(model, data.qpos), touching(model, data, bodies)
-    if not outside and not touched:
-        return []
     before = np.array(data.qpos)
-    data.qpos[:] = nearest_posture(model, before, arm, bodies)
-    way = float(np.abs(data.qpos - before).max())
-    names = ", ".join(model.joint(k).name for k in outside)
-    causes = [f"{names} outside the range"] * bool(outside) + ["the robot touching itself"] * bool(touched)
+    data.qpos[:] = within_ranges(model, before)
+    outside = [model.joint(k).name for k in movable(model) if data.qpos[a := model.jnt_qposadr[k]] != before[a]]
+    mujoco.mj_forward(model, data)
+    if touched := bool(touching(model, data, bodies)):
+        data.qpos[:] = nearest_posture(model, np.array(data.qpos), arm, bodies)
+    if (way := float(np.abs(data.qpos - before).max(initial=0))) < 1e-6:
+        return []
+    causes = [f"{', '.join(outside)} outside the range"] * bool(outside) + ["links that touch"] * touched
     return [
-        f"the model begins with {' and '.join(causes)}: movements begin in the nearest right posture, {way:.2g} (rad or "
+        f"it begins with {' and '.join(causes)}: movements begin in the nearest right posture, {way:.2g} (rad or "
         "m) away; for another, write a <key> named home into the model, or give --environment.keyframe"
     ]
 
@@ -182,19 +188,6 @@ def _without(spec: mujoco.MjSpec, model: mujoco.MjModel, pairs: set[tuple[int, i
     for one, other in new:
         spec.add_exclude(bodyname1=one, bodyname2=other)
     return spec.compile() if new else model
-
-
-def _is_urdf(path: Path) -> bool:
-    return ElementTree.parse(path).getroot().tag == "robot"
-
-
-def _speeds(path: Path) -> dict[str, float]:
-    """Largest speeds of the joints of a URDF by name; MuJoCo does not read them."""
-    if not _is_urdf(path):
-        return {}
-    limits = [(joint.get("name", ""), joint.find("limit")) for joint in ElementTree.parse(path).getroot().iter("joint")]
-    speeds = {name: float(limit.get("velocity", 0)) for name, limit in limits if limit is not None}
-    return {name: speed for name, speed in speeds.items() if speed > 0}
 
 
 def _of_package(path: Path, file: str) -> str:

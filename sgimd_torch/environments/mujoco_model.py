@@ -75,8 +75,9 @@ def outcome_places(model: mujoco.MjModel, outcome: str) -> list[Place]:
         kind, _, name = text.strip().partition(":")
         axes = ""
         head, _, tail = name.rpartition(":")
-        if head and name not in _names(model, kind) and (head in _names(model, kind) or {*tail} <= {*_AXES}):
-            name, axes = head, tail  # a name may have colons, too
+        known = _names(model, kind)
+        if head and name not in known and (head in known or {*tail} <= {*_AXES}):  # a name may have colons, too
+            name, axes = head, tail
         place = find(model, f"outcome {text!r}", kind, name)
         if not set(axes) <= set(_AXES if kind != "joint" else "") or len(set(axes)) < len(axes):
             raise ValueError(f"outcome {text!r}: {axes!r} are no axes; write some of x, y and z, for a joint nothing")
@@ -154,7 +155,9 @@ def commands_box(model: mujoco.MjModel, joints: Sequence[str]) -> tuple[Box, lis
             side = model.jnt_range[joint]
             if not model.jnt_limited[joint]:
                 if _slides_on(model, joint):
-                    raise ValueError(f"joint {model.joint(joint).name!r} slides without a range; write one into the model")
+                    raise ValueError(
+                        f"joint {model.joint(joint).name!r} slides without a range; write one into the model"
+                    )
                 side = np.array([-np.pi, np.pi])
                 endless.append(model.joint(joint).name)
             side = np.sort(side * model.actuator_gear[k, 0])
@@ -165,7 +168,8 @@ def commands_box(model: mujoco.MjModel, joints: Sequence[str]) -> tuple[Box, lis
         raise ValueError("no actuator moves a joint of the model with a range; write a range into the model")
     owners = [joint_of(model, k) for k in chosen]
     names = [model.actuator(k).name if j is None else model.joint(j).name for j, k in zip(owners, chosen, strict=True)]
-    return Box(*np.array(sides).T, tuple(names)), chosen, remarks
+    low, high = np.array(sides).T
+    return Box(low, high, tuple(names)), chosen, remarks
 
 
 def _slides_on(model: mujoco.MjModel, joint: int | None) -> bool:
@@ -230,26 +234,21 @@ def check_moved(model: mujoco.MjModel, place: Place, actuators: Sequence[int]) -
     Raises:
         ValueError: no joint moves the place, or a mocap body holds the arm that carries it.
     """
-    joints = joints_above(model, body_of(model, place))
+    what, joints = f"outcome {place.kind}:{place.name} stands still", joints_above(model, body_of(model, place))
     if not joints:
-        last = hand_of(model, Place("joint", "", 0), moved_by(model, actuators))
-        raise ValueError(
-            f"outcome {place.kind}:{place.name}: it stands still, as no joint moves it; is it on the base? Write a place "
-            f"of the arm, such as {last.kind}:{last.name}"
-        )
+        arm = hand_of(model, place, moved_by(model, actuators))
+        raise ValueError(f"{what}: no joint moves it, is it on the base? A place of the arm is {arm.kind}:{arm.name}")
     held = [body for _, body in pulled(model) if {*joints} & {*joints_above(model, body)}]
     if held and not {*joints} & {joint_of(model, k) for k in actuators}:
-        raise ValueError(
-            f"outcome {place.kind}:{place.name}: a mocap body holds {model.body(held[0]).name}, and no actuator moves "
-            f"{model.joint(joints[-1]).name}; --environment.servos made drives these joints"
-        )
+        name = model.body(held[0]).name
+        raise ValueError(f"{what}: a mocap body holds {name}; --environment.servos made moves its joints instead")
 
 
 def hand_of(model: mujoco.MjModel, place: Place, bodies: Sequence[int]) -> Place:
     """The end of an arm of ``bodies``: ``place`` if the arm carries it, else the outermost site, else the last body."""
     if place.kind != "joint" and body_of(model, place) in bodies:
         return place
-    outwards = path_to(model, max(bodies, key=lambda body: len(path_to(model, body))))
+    outwards = [body for body in path_to(model, max(bodies, key=lambda k: len(path_to(model, k)))) if body in bodies]
     sites = [k for body in reversed(outwards) for k in range(model.nsite) if model.site_bodyid[k] == body]
     kind, number = ("site", sites[0]) if sites else ("body", outwards[-1])
     return Place(kind, getattr(model, kind)(number).name, number)

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 from sgimd_torch.environments.controllers import Controller
 from sgimd_torch.environments.motor_primitives import GaussianPrimitive
 from sgimd_torch.environments.mujoco_file import file_of, files_of, load_model
-from sgimd_torch.environments.mujoco_look import NEARLY, Seen, look
+from sgimd_torch.environments.mujoco_look import NEARLY, SUNK, listed, missed, parts, reached
 from sgimd_torch.environments.mujoco_model import (
     body_of,
     check_moved,
@@ -29,13 +29,13 @@ from sgimd_torch.environments.mujoco_model import (
     context_box,
     hand_of,
     holding,
-    joint_of,
     moved_by,
     outcome_places,
     path_to,
     positions,
     pulled,
 )
+from sgimd_torch.environments.mujoco_posture import touching
 from sgimd_torch.environments.protocol import Primitive, SimulationError, check_movement, check_robot
 from sgimd_torch.environments.sketch import Sketch
 from sgimd_torch.spaces import Array, Box, check_count, check_point, check_rng, read_only, stream
@@ -349,24 +349,44 @@ class MujocoRobot:
 
     def _look(self) -> list[str]:
         """Sentences on what a user should know before the first movement."""
-        rngs = [stream(0, "look", k) for k in range(LOOKED)]
-        contexts = np.stack([self.contexts.sample(rng) for rng in rngs])
-        thetas = np.stack([self.policies.sample(rng) for rng in rngs])
-        near = self.policies.clip(thetas + NEARLY * np.stack([rng.choice([-1, 1], self.policies.dim) for rng in rngs]))
-        commands = [[self._commands(t, stream(0, "looked at", k)) for k, t in enumerate(ts)] for ts in (thetas, near)]
-        pairs = [*zip(*(self._simulate(contexts, sequences) for sequences in commands), strict=True)]
-        right = [k for k, pair in enumerate(pairs) if pair[0] is not None and pair[1] is not None]
-        outcomes = np.reshape([[self._outcome(states) for states in pairs[k]] for k in right], (-1, 2, self._dim))
-        ends = np.reshape([self.positions(pairs[k][0][-1]) for k in right], (-1, self.model.nq))
-        last = np.reshape([commands[0][k][-1, self._actuators] for k in right], (-1, len(self._actuators)))
-        middle = (self.contexts.low + self.contexts.high) / 2
+        lines, middle = parts(self.model), (self.contexts.low + self.contexts.high) / 2
         (still,) = self._simulate(middle[None], [self._still(self._longest)])
-        begins, sunk = self._read(self.start_in(middle)), 0.0
         if still is not None:
-            sunk = float(np.linalg.norm(self._read(still[-1]) - begins))
-            mujoco.mj_forward(self.model, self._at(still[-1]))
-        held = (bool(self.joints), self.bodies, self._data[0], sunk)
-        return look(Seen(self.model, self._actuators, *held, ends, last, outcomes, self.outcomes))
+            sunk = float(np.linalg.norm(self._read(still[-1]) - self._read(still[0])))
+            mujoco.mj_forward(self.model, data := self._at(still[-1]))
+            names = [" and ".join(self.model.body(k).name for k in p) for p in touching(self.model, data, self.bodies)]
+            if names:
+                lines.append(f"holding still, the robot touches itself: {listed(names)}; give --environment.keyframe")
+            if sunk > SUNK:
+                advice = "" if self.joints else "; its commands are no positions: --environment.servos made holds it"
+                lines.append(f"holding still, what is measured moves by {self.outcomes.amount(sunk, '.2g')}{advice}")
+        contexts, thetas = self._drawn("look", LOOKED)
+        signs = [stream(0, "signs", k).choice([-1, 1], self.policies.dim) for k in range(LOOKED)]
+        sets = thetas, self.policies.clip(thetas + NEARLY * np.stack(signs))
+        commands = [[self._commands(t, stream(0, "looked at", k)) for k, t in enumerate(s)] for s in sets]
+        ones, others = (self._simulate(contexts, sequences) for sequences in commands)
+        right = [
+            k for k, pair in enumerate(zip(ones, others, strict=True)) if pair[0] is not None and pair[1] is not None
+        ]
+        if not right:
+            return [*lines, "every random movement diverges: write a shorter timestep into the model"]
+        if self.joints:
+            ends = np.stack([self.positions(states[-1]) for k in right if (states := ones[k]) is not None])
+            last = np.stack([commands[0][k][-1, self._actuators] for k in right])
+            lines += missed(self.model, [self.model.joint(name).id for name in self.joints], ends, last)
+        if isinstance(self._controller, GaussianPrimitive):
+            lasts = [self._controller.duration(theta) for theta in thetas]
+            if max(lasts) > self._longest:
+                lines.append(f"movements last {min(lasts):.2g} to {max(lasts):.2g} s, as no joint can move faster")
+        return lines + reached(
+            np.array([[self._outcome(ones[k]), self._outcome(others[k])] for k in right]), self.outcomes
+        )
+
+    def _drawn(self, name: str, n: int) -> tuple[Array, Array]:
+        """Contexts and thetas of ``n`` random movements."""
+        rngs = [stream(0, name, k) for k in range(n)]
+        contexts = np.stack([self.contexts.sample(rng) for rng in rngs])
+        return contexts, np.stack([self.policies.sample(rng) for rng in rngs])
 
     def _scatter(self) -> float:
         """Standard deviation of the outcomes of random movements, each executed twice."""
@@ -405,9 +425,7 @@ class MujocoRobot:
 
     def _tried(self, n: int, execution: str) -> tuple[Array, Array]:
         """Measured places at the start, and outcomes, of ``n`` random movements; the noise depends on ``execution``."""
-        rngs = [stream(0, "random movements", k) for k in range(n)]
-        contexts = np.stack([self.contexts.sample(rng) for rng in rngs])
-        thetas = np.stack([self.policies.sample(rng) for rng in rngs])
+        contexts, thetas = self._drawn("random movements", n)
         ends = self.execute_many(contexts, thetas, [stream(0, execution, k) for k in range(n)])
         starts = (
             np.zeros_like(ends) if self._displacement else np.stack([self._read(self.start_in(c)) for c in contexts])

@@ -51,9 +51,7 @@ def joints_to_serve(model: mujoco.MjModel, servos: str, joints: Sequence[str], *
     return [k for root, k in zip(roots, movable, strict=True) if root in wanted]
 
 
-def serve(
-    spec: mujoco.MjSpec, model: mujoco.MjModel, chosen: Sequence[int]
-) -> tuple[mujoco.MjModel, dict[str, float]]:
+def serve(spec: mujoco.MjSpec, model: mujoco.MjModel, chosen: Sequence[int]) -> tuple[mujoco.MjModel, dict[str, float]]:
     """Give position servos to ``chosen`` joints, in place of their motors, and compile; with their accelerations.
 
     As those of an arm that one can buy, the servos know the weight of the links: it is compensated. A servo moves the
@@ -78,7 +76,10 @@ def serve(
                 spec.delete(motors[actuator.target])
             motors[actuator.target] = actuator
             if (effort := _effort(model, k)) and not model.jnt_actfrclimited[joint]:
-                spec.joint(actuator.target).actfrcrange, spec.joint(actuator.target).actfrclimited = [-effort, effort], 1
+                spec.joint(actuator.target).actfrcrange, spec.joint(actuator.target).actfrclimited = (
+                    [-effort, effort],
+                    1,
+                )
     for name in names:
         spec.joint(name).actgravcomp = 1
     for key in spec.keys:  # its commands are those of motors
