@@ -1,14 +1,13 @@
 """Model files, MJCF or URDF, made ready for movements: position servos, a start posture, contacts that are left out.
 
-robot = load_model(Path("arm.xml")); robot.model, robot.start, robot.remarks
+robot = load_model(Path("arm.xml"), (), "auto", "", ()); robot.model, robot.start, robot.remarks
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 from xml.etree import ElementTree
 
 import mujoco
@@ -26,25 +25,15 @@ SERVOS: Final = ("auto", "file", "made")
 _HOMES: Final = ("home", "rest")  # names of keyframes in which movements begin unless another one is chosen
 
 
-@dataclass(frozen=True, eq=False)
-class Loaded:
-    """A model that is ready for movements.
-
-    Args:
-        model: the model.
-        start: state in which movements begin.
-        posture: positions of the joints that turn or slide, at the start.
-        speeds: largest speeds (rad/s or m/s) of joints, by name, as far as the file has them.
-        accelerations: largest accelerations (rad/s^2 or m/s^2) of joints, by name, which their forces allow.
-        remarks: sentences for the user.
-    """
+class Loaded(NamedTuple):
+    """A model that is ready for movements; limits of joints are known by name, as far as there are any."""
 
     model: mujoco.MjModel
-    start: mujoco.MjData
-    posture: tuple[float, ...]
-    speeds: dict[str, float]
-    accelerations: dict[str, float]
-    remarks: list[str] = field(default_factory=list)
+    start: mujoco.MjData  # state in which movements begin
+    posture: tuple[float, ...]  # positions of the joints that turn or slide, at the start
+    speeds: dict[str, float]  # rad/s or m/s
+    accelerations: dict[str, float]  # rad/s^2 or m/s^2
+    remarks: list[str]
 
 
 def file_of(model: str | Path) -> Path:
@@ -66,13 +55,7 @@ def file_of(model: str | Path) -> Path:
         raise ValueError(f"model {model}: {error}") from error
 
 
-def load_model(
-    path: Path,
-    joints: Sequence[str] = (),
-    servos: str = "auto",
-    keyframe: str = "",
-    posture: Sequence[float] = (),
-) -> Loaded:
+def load_model(path: Path, joints: Sequence[str], servos: str, keyframe: str, posture: Sequence[float]) -> Loaded:
     """The model in a file; see `MujocoRobot` for the options.
 
     Raises:

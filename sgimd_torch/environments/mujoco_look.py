@@ -34,14 +34,7 @@ def parts(model: mujoco.MjModel) -> list[str]:
 
 
 def missed(model: mujoco.MjModel, joints: Sequence[int], ends: Array, commands: Array) -> list[str]:
-    """Joints that miss their commands when random movements have settled.
-
-    Args:
-        model: model of the robot.
-        joints: joints that are commanded to positions.
-        ends: ``(n, nq)`` positions at the ends of the movements.
-        commands: ``(n, n_joints)`` last commands of the movements.
-    """
+    """Joints that miss their last ``commands`` ``(n, n_joints)``; ``ends`` ``(n, nq)`` are positions after settling."""
     misses = np.abs(ends[:, model.jnt_qposadr[[*joints]]] - commands)
     medians, worst = np.median(misses, axis=0), misses.max(axis=0)
     told = [k for k in np.argsort(-medians) if (misses[:, k] > MISSED).mean() > OFTEN][:3]
@@ -55,12 +48,7 @@ def missed(model: mujoco.MjModel, joints: Sequence[int], ends: Array, commands: 
 
 
 def reached(outcomes: Array, space: Box) -> list[str]:
-    """How much of T random movements reach, and whether nearly equal ones end far apart.
-
-    Args:
-        outcomes: ``(n, 2, outcome_dim)`` outcomes of random movements, each with that of a nearly equal theta.
-        space: T.
-    """
+    """How much of T movements reach, and whether nearly equal ones end far apart: ``outcomes`` ``(n, 2, dim)``."""
     far = np.linalg.norm(np.diff(outcomes, axis=1)[:, 0], axis=1) > APART * space.sides.max()
     cells = np.floor((outcomes[:, 0] - space.low) / space.sides * _PARTS)
     inside = cells[((cells >= 0) & (cells < _PARTS)).all(axis=1)]

@@ -41,13 +41,9 @@ def touching(model: mujoco.MjModel, data: mujoco.MjData, bodies: Sequence[int]) 
 
 
 def nearest_posture(model: mujoco.MjModel, home: Array, joints: Sequence[int], bodies: Sequence[int]) -> Array:
-    """``(nq,)``, the nearest positions in which ``bodies`` do not touch each other; a few contacts may be left.
+    """``(nq,)``, the positions nearest to ``home`` in which ``bodies`` do not touch each other; contacts may be left.
 
-    Args:
-        model: model of the robot.
-        home: ``(nq,)`` positions within all ranges.
-        joints: joints that may move to end a contact.
-        bodies: bodies of the robot.
+    ``home`` lies within all ranges; only ``joints`` move.
     """
     wide = copy.copy(model)  # sees contacts before they begin
     wide.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_OVERRIDE)

@@ -23,14 +23,10 @@ _POSTURES: Final = 50  # number of random postures that measure inertias and loa
 
 
 def joints_to_serve(model: mujoco.MjModel, servos: str, joints: Sequence[str], *, alone: bool) -> list[int]:
-    """Joints that get a position servo.
+    """Joints that get a position servo; see ``servos`` of `MujocoRobot`.
 
-    Args:
-        model: model as its file describes it.
-        servos: "auto" for joints with a motor, or if there are no actuators for the joints of the robot; "made" for all
-            joints with an actuator and those of an arm that a mocap body pulls; "file" for none.
-        joints: names of joints that shall move; a tree of bodies with one of them is the robot.
-        alone: whether the model has nothing but the robot; else its largest tree of bodies is the robot.
+    If nothing acts on a joint, the robot is the tree of bodies that has one of ``joints``, else the largest tree. A
+    model that is ``alone`` has nothing but the robot.
     """
     acted = dict[int, list[int]]()
     for k in range(model.nu):

@@ -19,7 +19,8 @@ ARM = """<mujoco><option timestep=".004"/>
         <body name="pole" pos=".3 0 0"><joint name="swing" axis="0 1 0" damping=".01"/>
           <geom size=".01" pos="0 0 -.05" contype="0" conaffinity="0"/></body></body></body></body></worldbody>
   <actuator><motor joint="r:1" ctrlrange="-20 20"/><motor joint="r:2" ctrlrange="-10 10"/></actuator></mujoco>"""
-PULLED = """<mujoco><worldbody><body name="cart"><joint name="x" type="slide" axis="1 0 0" range="-1 1"/><geom size=".1"/>
+PULLED = """<mujoco><worldbody>
+    <body name="cart"><joint name="x" type="slide" axis="1 0 0" range="-1 1"/><geom size=".1"/>
     <site name="hand"/><body name="claw"><joint name="grip" range="0 1"/><geom size=".02" pos=".2 0 0"/></body></body>
     <body name="puller" mocap="true"/></worldbody>
   <equality><weld body1="puller" body2="cart"/></equality>
