@@ -93,20 +93,22 @@ def load_model(path: Path, joints: Sequence[str], servos: str, keyframe: str, po
         arm = sorted({joint for joint in arm if int(model.jnt_type[joint]) in UNITS})
         bodies = _robot(model, arm, alone=alone)
         model = _without(spec, model, _beside_base(model, bodies))
-        data = _begin(model, keyframe, path.name)
+        names = [model.key(k).name for k in range(model.nkey)]
+        if keyframe and keyframe not in names:
+            raise unknown_name_error(f"keyframe of {path.name}", keyframe, names)
+        keyframe = keyframe or next((name for home in _HOMES for name in names if name.lower() == home), "")
+        data = _reset(model, keyframe)
         if posture:
             data.qpos[model.jnt_qposadr[movable(model)]] = check_point("posture", posture, len(movable(model)))
         else:
-            remarks += _take_posture(model, data, arm, bodies)
+            remarks += _take_posture(model, data, arm, bodies, keyframe)
         mujoco.mj_forward(model, data)
-        resting = {pair for pair in touching(model, data, bodies) if pair[0]}
-        if resting:
+        if resting := {pair for pair in touching(model, data, bodies) if pair[0]}:
             links = listed([" and ".join(model.body(body).name for body in pair) for pair in sorted(resting)])
             remarks += [f"contacts in the start posture are left out: {links}"] if not posture else []
-            again = _without(spec, model, resting)
-            renewed = mujoco.MjData(again)
-            mujoco.mj_copyState(again, data, renewed, int(mujoco.mjtState.mjSTATE_INTEGRATION))
-            model, data = again, renewed
+            start, model = np.array(data.qpos), _without(spec, model, resting)
+            data = _reset(model, keyframe)
+            data.qpos[:] = start
         kept = tuple(float(x) for x in data.qpos[model.jnt_qposadr[movable(model)]])
         return Loaded(
             model, data, kept, {name: speed for name, speed in speeds.items() if speed > 0}, accelerations, remarks
@@ -122,32 +124,33 @@ def files_of(path: Path) -> list[Path]:
     return sorted({file.resolve() for file in files if file.is_file()})
 
 
-def _begin(model: mujoco.MjModel, keyframe: str, file: str) -> mujoco.MjData:
-    """The state of a keyframe, or if none is chosen of one named home or rest, or else the model's initial state."""
-    data, names = mujoco.MjData(model), [model.key(k).name for k in range(model.nkey)]
-    if keyframe and keyframe not in names:
-        raise unknown_name_error(f"keyframe of {file}", keyframe, names)
-    chosen = [keyframe] if keyframe else [name for home in _HOMES for name in names if name.lower() == home]
-    if chosen:
-        mujoco.mj_resetDataKeyframe(model, data, names.index(chosen[0]))
+def _reset(model: mujoco.MjModel, keyframe: str) -> mujoco.MjData:
+    """The state of a keyframe, "" for the initial state."""
+    data = mujoco.MjData(model)
+    if keyframe:
+        mujoco.mj_resetDataKeyframe(model, data, model.key(keyframe).id)
     return data
 
 
-def _take_posture(model: mujoco.MjModel, data: mujoco.MjData, arm: Sequence[int], bodies: Sequence[int]) -> list[str]:
-    """Put the nearest posture within all ranges and without contacts of the robot with itself into ``data``."""
-    before = np.array(data.qpos)
-    data.qpos[:] = within_ranges(model, before)
+def _take_posture(
+    model: mujoco.MjModel, data: mujoco.MjData, arm: Sequence[int], bodies: Sequence[int], keyframe: str
+) -> list[str]:
+    """Put the nearest posture within all ranges and without contacts of ``bodies`` into ``data``; a keyframe stays."""
+    before, data.qpos[:] = np.array(data.qpos), within_ranges(model, data.qpos)
     outside = [model.joint(k).name for k in movable(model) if data.qpos[a := model.jnt_qposadr[k]] != before[a]]
+    if keyframe:
+        data.qpos[:] = before
+        return [f"keyframe {keyframe} puts {', '.join(outside)} outside the range"] * bool(outside)
     mujoco.mj_forward(model, data)
     if touched := bool(touching(model, data, bodies)):
         data.qpos[:] = nearest_posture(model, np.array(data.qpos), arm, bodies)
-    if (way := float(np.abs(data.qpos - before).max(initial=0))) < 1e-6:
-        return []
+    way = float(np.abs(data.qpos - before).max(initial=0))
     causes = [f"{', '.join(outside)} outside the range"] * bool(outside) + ["links that touch"] * touched
-    return [
-        f"it begins with {' and '.join(causes)}: movements begin in the nearest right posture, {way:.2g} (rad or "
-        "m) away; for another, write a <key> named home into the model, or give --environment.keyframe"
-    ]
+    said = (
+        f"it begins with {' and '.join(causes)}: movements begin in the nearest right posture, {way:.2g} (rad or m) away; "
+        "for another, write a <key> named home into the model, or give --environment.keyframe"
+    )
+    return [said] * (way > 1e-6)
 
 
 def _robot(model: mujoco.MjModel, arm: Sequence[int], *, alone: bool) -> list[int]:
