@@ -147,7 +147,7 @@ def _take_posture(
     way = float(np.abs(data.qpos - before).max(initial=0))
     causes = [f"{', '.join(outside)} outside the range"] * bool(outside) + ["links that touch"] * touched
     said = (
-        f"it begins with {' and '.join(causes)}: movements begin in the nearest right posture, {way:.2g} (rad or m) away; "
+        f"it begins with {' and '.join(causes)}: movements begin in the nearest right posture, {way:.2g} rad or m off; "
         "for another, write a <key> named home into the model, or give --environment.keyframe"
     )
     return [said] * (way > 1e-6)
