@@ -13,6 +13,7 @@ from sgimd_torch.__main__ import _call
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.environments.lerobot import BLOCKED, LeRobotArm
 from sgimd_torch.environments.protocol import check_robot
+from sgimd_torch.runs.directory import code_of
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.signals import command
 from table import interrupt, on_table, write
@@ -152,6 +153,11 @@ REFUSED = {
     "the joints do not say where body:puck:x is; seen_by": {"outcome": "body:puck:x"},
     "speed must be finite and above 0, got 0": {"speed": 0.0},
 }
+
+
+def test_code_that_drives_or_sees_the_arm_is_executed_only_if_it_is_trusted():
+    settings = {"environment": "lerobot", "environment.robot": "lab:make", "environment.seen_by": "camera:puck"}
+    assert code_of(settings) == ["camera:puck", "lab:make"]
 
 
 @pytest.mark.parametrize("message", REFUSED)
