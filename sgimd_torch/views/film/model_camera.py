@@ -43,7 +43,7 @@ class ModelCamera(MujocoPainter):
         self._robot = robot
         if not self._model.nlight:
             light = self._model.vis.headlight
-            light.ambient[:], light.diffuse[:] = 0.45, 0.35
+            light.ambient[:], light.diffuse[:] = 0.4, 0.2
         self._renderer.scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False  # slow
         corners = np.concatenate([_edges(robot, shot).reshape(-1, 3) for shot in shots])
         arm = [self._at(state).xpos[robot.bodies] for shot in shots for state in _filmed(shot).states[::5]]
@@ -88,7 +88,7 @@ class ModelCamera(MujocoPainter):
         if not model.nlight:
             light = scene.lights[scene.nlight]
             light.pos[:], light.dir[:] = self._ground + np.array([far, -far, 4 * far]), (-0.24, 0.24, -0.94)
-            light.ambient[:], light.diffuse[:], light.specular[:] = 0.0, 0.6, 0.2
+            light.ambient[:], light.diffuse[:], light.specular[:] = 0.0, 0.5, 0.1
             light.type, light.headlight, light.castshadow = mujoco.mjtLightType.mjLIGHT_SPOT, 0, 1
             light.attenuation[:], light.cutoff, light.exponent = (1, 0, 0), 80, 0
             scene.nlight += 1
