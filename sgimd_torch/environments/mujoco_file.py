@@ -93,10 +93,10 @@ def load_model(path: Path, joints: Sequence[str], servos: str, keyframe: str, po
         arm = sorted({joint for joint in arm if int(model.jnt_type[joint]) in UNITS})
         bodies = _robot(model, arm, alone=alone)
         model = _without(spec, model, _beside_base(model, bodies))
-        names = [model.key(k).name for k in range(model.nkey)]
-        if keyframe and keyframe not in names:
-            raise unknown_name_error(f"keyframe of {path.name}", keyframe, names)
-        keyframe = keyframe or next((name for home in _HOMES for name in names if name.lower() == home), "")
+        keys = [model.key(k).name for k in range(model.nkey)]
+        if keyframe and keyframe not in keys:
+            raise unknown_name_error(f"keyframe of {path.name}", keyframe, keys)
+        keyframe = keyframe or next((key for home in _HOMES for key in keys if key.lower() == home), "")
         data = _reset(model, keyframe)
         if posture:
             data.qpos[model.jnt_qposadr[movable(model)]] = check_point("posture", posture, len(movable(model)))
