@@ -159,7 +159,7 @@ def on_table(path, built=None, *, of_arm=(), **options):
     clock = Clock()
     LIVE.append(TableArm(built or path, clock, **dict(of_arm)))
     given = {"outcome": "site:tip:xy", "units": "deg", "low": (-0.7, -0.7), "high": (0.7, 0.7), "durations": (1.0, 2.0)}
-    return LeRobotArm("table:make", model=str(path), clock=clock, **{**given, **options}), LIVE[-1]
+    return LeRobotArm("arms:make", model=str(path), clock=clock, **{**given, **options}), LIVE[-1]
 
 
 @with_keywords_of(LeRobotArm)
