@@ -2,7 +2,7 @@
 
     robot = MujocoRobot("arm.xml", outcome="site:tip"); outcome = robot.execute(robot.observe(rng), theta, rng)
 A movement is open loop: all commands are known before it begins. So MuJoCo simulates many movements in parallel,
-outside Python. ``mujoco_model.py`` reads the model and finds what is named in it.
+outside Python. The folder ``models`` reads the file and finds what is named in it.
 """
 
 from __future__ import annotations
@@ -19,10 +19,9 @@ from mujoco import rollout
 from numpy.typing import ArrayLike
 
 from sgimd_torch.environments.controllers import Controller
-from sgimd_torch.environments.motor_primitives import GaussianPrimitive
-from sgimd_torch.environments.mujoco_file import file_of, files_of, load_model
-from sgimd_torch.environments.mujoco_look import NEARLY, SUNK, listed, missed, parts, reached
-from sgimd_torch.environments.mujoco_model import (
+from sgimd_torch.environments.models.file import file_of, files_of, load_model
+from sgimd_torch.environments.models.look import NEARLY, SUNK, listed, missed, parts, reached
+from sgimd_torch.environments.models.places import (
     body_of,
     check_moved,
     commands_box,
@@ -35,7 +34,8 @@ from sgimd_torch.environments.mujoco_model import (
     positions,
     pulled,
 )
-from sgimd_torch.environments.mujoco_posture import touching
+from sgimd_torch.environments.models.posture import touching
+from sgimd_torch.environments.motor_primitives import GaussianPrimitive
 from sgimd_torch.environments.protocol import Primitive, SimulationError, check_movement, check_robot
 from sgimd_torch.environments.sketch import Sketch
 from sgimd_torch.spaces import Array, Box, check_count, check_point, check_rng, read_only, stream

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from sgimd_torch import MujocoRobot, check_environment, stream
-from sgimd_torch.environments.mujoco_posture import NEAR, nearest_posture
+from sgimd_torch.environments.models.posture import NEAR, nearest_posture
 
 # Two links of .3 m under gravity, with motors; the second one begins outside its range, and carries a pole that swings.
 ARM = """<mujoco><option timestep=".004"/>

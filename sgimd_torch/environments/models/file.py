@@ -13,10 +13,10 @@ from xml.etree import ElementTree
 import mujoco
 import numpy as np
 
-from sgimd_torch.environments.mujoco_look import listed
-from sgimd_torch.environments.mujoco_model import UNITS, joint_of, pulled
-from sgimd_torch.environments.mujoco_posture import movable, nearest_posture, touching, within_ranges
-from sgimd_torch.environments.mujoco_servos import joints_to_serve, serve
+from sgimd_torch.environments.models.look import listed
+from sgimd_torch.environments.models.places import UNITS, joint_of, pulled
+from sgimd_torch.environments.models.posture import movable, nearest_posture, touching, within_ranges
+from sgimd_torch.environments.models.servos import joints_to_serve, serve
 from sgimd_torch.files import check_regular
 from sgimd_torch.options.catalogue import unknown_name_error
 from sgimd_torch.spaces import check_point

@@ -11,8 +11,8 @@ from typing import Final
 import mujoco
 import numpy as np
 
-from sgimd_torch.environments.mujoco_model import UNITS, joint_of, pulled
-from sgimd_torch.environments.mujoco_posture import movable
+from sgimd_torch.environments.models.places import UNITS, joint_of, pulled
+from sgimd_torch.environments.models.posture import movable
 from sgimd_torch.spaces import Array, Box
 
 NEARLY: Final = 1e-3  # share of a side of Pi by which two nearly equal thetas differ
