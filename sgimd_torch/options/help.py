@@ -10,7 +10,11 @@ from sgimd_torch.options.catalogue import WORDS, about
 from sgimd_torch.options.config import RUN, Config, chosen, dashed
 from sgimd_torch.options.signature import Option, as_text, help_of, name_of
 
-_CHOOSE: Final = {"progress": "goals.progress", "choose": "teacher.choose"}  # options that choose parts of other parts
+_CHOOSE: Final = {
+    "progress": "goals.progress",
+    "choose": "teacher.choose",
+    "network": "inverse.network",
+}  # options that choose parts of other parts
 _WIDTH: Final = 120  # signs in a line
 
 
