@@ -34,7 +34,7 @@ HOW_TO = tuple(
     f"docs/{name}.md"
     for name in ("own-robot", "reading-runs", "own-demonstrations", "teaching-by-hand", "own-teacher", "asking")
 )
-SLOW = ("docs/tutorial.md", "docs/how-to/forward-model.md")  # the rod's physics; torch
+SLOW = ("docs/tutorial.md", "docs/how-to/forward-model.md", "docs/how-to/own-network.md")  # the rod's physics; torch
 PAGES = [
     *ALONE,
     "CHANGELOG.md",
@@ -189,7 +189,7 @@ def test_the_readme_and_its_example_are_short_enough_to_read():
 
 def test_all_pages_together_can_be_read():
     pages = [path for path in ROOT.rglob("*.md") if not {".venv", "site", "build"} & set(path.relative_to(ROOT).parts)]
-    assert sum(len(path.read_text(encoding="utf-8").split()) for path in pages) <= 30_000
+    assert sum(len(path.read_text(encoding="utf-8").split()) for path in pages) <= 31_000
 
 
 def test_the_version_to_cite_is_that_of_the_package():
