@@ -36,7 +36,8 @@ with loading():  # Ctrl-C shows no traceback
     from evidence import LAST, Evidence, NotRun
     from page_tables import GAIN
     from robot_figures import FIGURES as OF_ROBOTS
-    from sgimd_torch.figures.learning import COLOURS, NAMES
+    from sgimd_torch.figures.axes import curve_in_band
+    from sgimd_torch.figures.names import COLOURS, NAMES
     from sgimd_torch.figures.save import save_figure
     from sgimd_torch.files import make_folder
     from sgimd_torch.views.statistics import Interval, bootstrap_rng, iqm_interval
@@ -105,8 +106,7 @@ def curves(ax: Axes, evidence: Evidence, variants: Mapping[str, str]) -> None:
         curve = evidence.curve(name)
         movements = curve.columns
         centre, low, high = np.array([iqm_interval(curve[at], rng=bootstrap_rng()) for at in movements]).T
-        ax.fill_between(movements, low, high, color=COLOURS[algorithm], alpha=0.2, linewidth=0)
-        ax.plot(movements, centre, "o-", color=COLOURS[algorithm], markersize=4, label=NAMES[algorithm])
+        curve_in_band(ax, movements, (centre, low, high), COLOURS[algorithm], NAMES[algorithm])
         ends[algorithm] = centre[-1]
     ax.set(xscale="log", xlabel="movements executed", ylabel=ERROR)
     ax.set_xlim(right=3.2 * LAST)

@@ -15,6 +15,7 @@ from sgimd_torch.runs.signals import ONE_THREAD, command, loading
 EXTRAS: Final = {
     **dict.fromkeys(("demonstrations", "demo"), "plot"),
     **{name: name for name in ("report", "teach", "film")},
+    "paper": "report",
 }
 """The extra of the package that each of these commands needs."""
 HELP: Final = f"""usage: sgimd COMMAND [OPTIONS]
@@ -34,6 +35,7 @@ examples:
   sgimd demonstrations check shown.npz --environment fishing-rod
   sgimd sweep --vary goals=interest-map,uniform --seeds 0-9 --out study
   sgimd table study                                  print the mean error of each variant over its seeds
+  sgimd paper figures                                the figures of the paper's section 6, made anew, in ten minutes
   sgimd report study                                 write curves, maps and tables to one page
 
 sgimd COMMAND --help explains a command; sgimd --version prints the version."""

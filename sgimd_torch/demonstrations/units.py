@@ -5,18 +5,16 @@ recordings = [paced(recording, 2.0) for recording in in_units(recordings, {"": "
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from difflib import get_close_matches
 from typing import Final
 
 import numpy as np
 
 from sgimd_torch.demonstrations.columns import Recording
 from sgimd_torch.spaces import Array, Box
+from sgimd_torch.units import in_rad, units_of
 
-_RANGE: Final = re.compile(r"(-?\d+\.?\d*):(-?\d+\.?\d*)")
 _TURN: Final = 7.0  # rad, a little more than a turn; a joint that reads more may be in degrees
 _MOVES: Final = 0.02  # rad/s; joints that were never faster count as unmoved
 _STILL: Final = 0.05  # share of the largest speed of a recording; while all joints are slower, they pause
@@ -40,19 +38,12 @@ def in_units(
             be said, because units are ``unclear`` or because the joint reads more than a turn.
     """
     joints = next((recording.joints for recording in recordings if recording.demonstration), ())
-    unit_of = dict[str, str]()
-    for key, unit in sorted(units.items()):  # "" first
-        named = [joint for joint in joints if key in ("", joint, joint.partition(".")[0])]
-        if joints and not named:
-            near = " or ".join(get_close_matches(key, joints, 3, 0.0))
-            raise ValueError(f"--unit {key}={unit}: no joint is named {key}; did you mean {near}?")
-        unit_of |= dict.fromkeys(named, unit)
+    unit_of = units_of(joints, units)
     if ranges is not None and joints and ranges.dim != len(joints):
         raise ValueError(f"the robot has {ranges.dim} joints, the recordings have {len(joints)}: {', '.join(joints)}")
     scales, shifts = np.ones(len(joints)), np.zeros(len(joints))
     for k, joint in enumerate(joints):
         unit = unit_of.get(joint, "")
-        match = _RANGE.fullmatch(unit)
         if not unit and unclear:
             raise ValueError(f"{unclear}; say all units, for example --unit deg,{joints[-1].partition('.')[0]}=0:100")
         if not unit:
@@ -64,15 +55,9 @@ def in_units(
                     f"{joint} reads up to {most:.4g} in {name}, more than a turn in rad; say its unit: "
                     f"--unit {joint}=deg, or rad, or a range such as -100:100"
                 )
-        elif unit == "deg":
-            scales[k] = np.pi / 180
-        elif match is not None and float(match[1]) < float(match[2]):
-            if ranges is None:
-                raise ValueError(f"{joint}={unit} maps onto the range of a joint of a robot; name it by --environment")
-            scales[k] = ranges.sides[k] / (float(match[2]) - float(match[1]))
-            shifts[k] = ranges.low[k] - scales[k] * float(match[1])
-        elif unit != "rad":
-            raise ValueError(f"the unit of {joint} must be rad, deg or a range such as -100:100, got {unit}")
+        else:
+            side = None if ranges is None else (float(ranges.low[k]), float(ranges.high[k]))
+            scales[k], shifts[k] = in_rad(joint, unit, side)
     return [
         recording._replace(
             demonstration=recording.demonstration

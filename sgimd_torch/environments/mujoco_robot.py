@@ -175,6 +175,23 @@ class MujocoRobot:
         kind, body = self._hand.kind, body_of(self.model, self._hand)
         return self.model.body(body).name if kind == "geom" else self._hand.name
 
+    @property
+    def carries_outcome(self) -> bool:
+        """Whether the joints of the robot alone say where the measured places are."""
+        arm = self.joints, self.bodies
+        return all((p.name in arm[0]) if p.kind == "joint" else body_of(self.model, p) in arm[1] for p in self._places)
+
+    def commanded(self, theta: Array) -> Array:
+        """``(n_steps, n_commands)``, commands of a movement without noise, one for each timestep of the model."""
+        return self._commands(theta, stream(0, "no noise"))[:, self._actuators]
+
+    def outcome_at(self, joints: Array) -> Array:
+        """``(outcome_dim,)``, measured places when the robot's joints are at ``(n_joints,)`` rad; other things rest."""
+        data = self._at(self._home)
+        data.qpos[[self.model.joint(name).qposadr[0] for name in self.joints]] = joints
+        mujoco.mj_kinematics(self.model, data)
+        return np.concatenate([place.read(data) for place in self._places])
+
     def observe(self, rng: np.random.Generator) -> Array:
         """``(context_dim,)``, uniform in C."""
         return self.contexts.sample(rng)

@@ -5,6 +5,7 @@ Functions with an argument ``ax`` draw on it.   mesh = ax.pcolormesh(x, y, z); c
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any, Final
 
@@ -58,6 +59,21 @@ def over_movements(ax: Axes, label: str) -> None:
     ax.set(xlabel="movements executed", ylabel=label)
     ax.set_xlim(left=0)
     ax.grid(alpha=0.3)
+
+
+def curve_in_band(ax: Axes, movements: ArrayLike, curve: Iterable[Array], colour: str, label: str) -> None:
+    """Draw a curve over movements, with points at the evaluations and its intervals as a band.
+
+    Args:
+        ax: axes.
+        movements: ``(n,)`` numbers of movements.
+        curve: values and both ends of their intervals, each ``(n,)``; without intervals (NaN) there is no band.
+        colour: colour of the curve.
+        label: name of the curve in a legend.
+    """
+    centre, low, high = curve
+    ax.fill_between(movements, low, high, color=colour, alpha=0.2, linewidth=0)
+    ax.plot(movements, centre, "o-", color=colour, markersize=4, label=label)
 
 
 def colour_bar(ax: Axes, drawn: ScalarMappable, label: str, *, extend: str = "neither") -> Colorbar:

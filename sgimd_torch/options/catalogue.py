@@ -30,6 +30,7 @@ algorithm    rivals.quality_diversity   cma-mae=cma_mae_alone cma-mae-taught=cma
 environment  runs.tasks.rod             fishing-rod
 environment  runs.tasks.robots          planar-arm-7 planar-arm-50
 environment  environments.mujoco_robot  mujoco=MujocoRobot
+environment  environments.lerobot       lerobot=LeRobotArm
 goals        goals.interest_map         interest-map=InterestMap
 goals        rivals.alp_gmm             alp-gmm=AlpGmm
 goals        goals.uniform              uniform=UniformGoals
@@ -63,6 +64,7 @@ command      views.demonstrations       demonstrations
 command      views.benchmark            benchmark
 command      views.table                table
 command      views.report.command       report
+command      views.report.paper         paper
 command      teach.command              teach
 command      views.film.command         film
 command      views.ask                  ask
@@ -115,8 +117,17 @@ def load_word(kind: str, word: str) -> Callable[..., Any]:
     Raises:
         ValueError: there is none, its module cannot be imported, or it cannot be called; the message says why.
     """
-    module, _, name = place_of(kind, word).partition(":")
-    what, folder = f"{kind} {word}", os.getcwd()
+    return load_place(f"{kind} {word}", place_of(kind, word), ours=word in WORDS[kind])
+
+
+def load_place(what: str, place: str, *, ours: bool = False) -> Callable[..., Any]:
+    """The class or function at a ``package.module:attribute``; ``what`` begins the message of an error.
+
+    Raises:
+        ValueError: see ``load_word``; if the place is ``ours``, the message of an ImportError is used as it is.
+    """
+    module, _, name = place.partition(":")
+    folder = os.getcwd()
     if module.endswith(".py"):
         raise ValueError(f"{what}: write the module without .py and with dots, {module[:-3].replace('/', '.')}:{name}")
     if folder not in sys.path:
@@ -124,7 +135,7 @@ def load_word(kind: str, word: str) -> Callable[..., Any]:
     try:
         loaded = importlib.import_module(module)
     except (Exception, SystemExit) as error:  # a user's module may raise anything
-        if isinstance(error, ImportError) and word in WORDS[kind]:
+        if isinstance(error, ImportError) and ours:
             raise ValueError(str(error)) from error  # it names the extra that installs what is missing
         where = f"; is it installed, or in {folder}?" if isinstance(error, ImportError) else ""
         why = f"{type(error).__name__}: {error}{where}"

@@ -23,7 +23,7 @@ import itertools
 import os
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Final, NamedTuple, TypeVar
@@ -154,7 +154,7 @@ def variants_of(varied: Sequence[str], options: Sequence[str]) -> list[Config]:
     Raises:
         ValueError: an option cannot be varied, is given twice, or is refused by ``sgimd run``.
     """
-    given = [dashed(word.partition("=")[0].removeprefix("--")) for word in options if word.startswith("--")]
+    given = given_in(options)
     values: dict[str, list[str]] = {}
     for word in varied:
         name, _, listed = word.removeprefix("--").partition("=")
@@ -165,9 +165,7 @@ def variants_of(varied: Sequence[str], options: Sequence[str]) -> list[Config]:
         if option in [*values, *given]:
             raise ValueError(f"--{option} is given twice; put all its values into one --vary")
         values[option] = list(dict.fromkeys(choices))
-    for option, instead in NOT_VARIED.items():
-        if option in values or (option in given and option != "out"):
-            raise ValueError(f"--{option} cannot be given here: {instead}")
+    refuse([*values, *(option for option in given if option != "out")], NOT_VARIED)
     variants = []
     for combination in itertools.product(*values.values()):
         chosen = dict(zip(values, combination, strict=True))
@@ -175,6 +173,22 @@ def variants_of(varied: Sequence[str], options: Sequence[str]) -> list[Config]:
         in_order = sorted(chosen, key=lambda option: (option != "algorithm", option))
         variants.append(replace(config, name=",".join(_in_name(option, chosen[option]) for option in in_order) or None))
     return variants
+
+
+def given_in(words: Sequence[str]) -> list[str]:
+    """Names of the options that a command line gives, as it spells them, without dashes in front."""
+    return [dashed(word.partition("=")[0].removeprefix("--")) for word in words if word.startswith("--")]
+
+
+def refuse(given: Sequence[str], reasons: Mapping[str, str]) -> None:
+    """Refuse options that a command sets itself, with the reason.
+
+    Raises:
+        ValueError: an option is one of those.
+    """
+    for option in given:
+        if option in reasons:
+            raise ValueError(f"--{option} cannot be given here: {reasons[option]}")
 
 
 def _in_name(option: str, value: str) -> str:

@@ -33,6 +33,7 @@ from sgimd_torch.options.config import Config
 from sgimd_torch.runs.parallel import sweep
 from sgimd_torch.runs.read import finished, read_run
 from sgimd_torch.runs.signals import Failed, loading, parser_of, say
+from sgimd_torch.runs.sweep import given_in, refuse
 
 LEARNERS: Final = {
     "random": "makes random movements",
@@ -83,10 +84,7 @@ def configs_of(rest: Sequence[str]) -> dict[str, Config]:
     Raises:
         ValueError: an option is fixed by the demo, or leaves nothing to draw.
     """
-    given = {word.partition("=")[0].lstrip("-") for word in rest}
-    for name in ("algorithm", "name", "environment"):
-        if name in given:
-            raise ValueError(f"--{name} cannot be given here: the demo shows its own learners on the fishing rod")
+    refuse(given_in(rest), dict.fromkeys(("algorithm", "name", "environment"), "the demo shows its own learners"))
     words = ["--out=runs/demo", "--evaluate-at=250,1000", "--floor-at=[]", f"--environment={ROD}", *rest]
     configs = {algorithm: parse([*words, f"--algorithm={algorithm}"])[0] for algorithm in LEARNERS}
     if not configs["sgim-d"].evaluations:

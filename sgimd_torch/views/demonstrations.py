@@ -1,9 +1,10 @@
-"""Check recordings on a robot, or import them from other formats.
+"""Check recordings on a robot, import them from other formats, or record movements of an arm that you lead.
 
   check    prints a line for each recording: the recorded outcome (says), the outcome on the simulated robot (lands),
            the distance between these outcomes (apart), the distance from the recording to the movement that the robot
            plays (misfit), and the limits of the robot that the recording exceeds (remarks)
   import   converts recordings to a file for sgimd run --demonstrations; with --environment it checks them first
+  record   records movements of an arm that you lead by hand, with torque off; each ends when the arm has been still
 
 SOURCE is an .npz file of save_demonstrations, a text file with columns, a folder with a text file for each recording,
 or the folder of a LeRobot dataset (v2.1 or v3). Columns of a text are divided by commas, semicolons, tabs or spaces.
@@ -18,6 +19,7 @@ Examples:
   sgimd demonstrations check logs --environment mypackage.toss:make --columns time,a,b,x,y --joints a,b --outcome x,y
   sgimd demonstrations import datasets/my_arm --joints observation.state --environment mypackage.arm:make
       --unit deg,gripper=0:100 --trim --out shown.npz
+  sgimd demonstrations record --environment lerobot --environment.robot so101_follower ... --out shown.npz
 
 Exit code: 0 all recordings can be used, 2 some cannot be used, or the request is wrong.
 """
@@ -25,7 +27,7 @@ Exit code: 0 all recordings can be used, 2 some cannot be used, or the request i
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -36,7 +38,7 @@ from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
 from sgimd_torch.demonstrations.columns import ColumnNames, Recording
 from sgimd_torch.demonstrations.fit import beyond_limits, misfit_of
 from sgimd_torch.demonstrations.text import read_text
-from sgimd_torch.demonstrations.units import in_units, paced
+from sgimd_torch.demonstrations.units import in_units, moving, paced
 from sgimd_torch.environments.protocol import Replaying, SimulationError, primitive_of
 from sgimd_torch.files import check_regular
 from sgimd_torch.options.build import task_of
@@ -45,6 +47,7 @@ from sgimd_torch.runs.signals import parsed_argument, parser_of, say
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.runs.tasks.taught import theta_of
 from sgimd_torch.spaces import Array, Box, Demonstration, check_point, stream
+from sgimd_torch.units import units_from
 from sgimd_torch.views.results import print_table
 
 HEADS: Final = ("recording", "lasts (s)", "samples", "says", "lands", "apart", "misfit", "remarks")
@@ -96,7 +99,7 @@ def parser() -> argparse.ArgumentParser:
     )
     source.add_argument(
         "--unit",
-        type=_units,
+        type=units_from,
         default={},
         metavar="UNIT,JOINT=UNIT",
         help="unit of all or of single joints: rad, deg, or a range such as 0:100, which maps onto the joint's range; "
@@ -106,25 +109,27 @@ def parser() -> argparse.ArgumentParser:
     source.add_argument("--trim", action="store_true", help="cut off stillness before and after the movement")
     described: dict[str, Any] = {"description": __doc__, "formatter_class": argparse.RawDescriptionHelpFormatter}
     parser = parser_of("demonstrations", __doc__)
-    commands = parser.add_subparsers(dest="command", required=True, metavar="check|import")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="check|import|record")
     checked = commands.add_parser("check", help="execute recordings on a robot", parents=[source], **described)
     imported = commands.add_parser(
         "import", help="convert recordings to a file for --demonstrations", parents=[source], **described
     )
-    for command in (checked, imported):
+    recorded = commands.add_parser("record", help="record movements of an arm that you lead by hand", **described)
+    for command in (checked, imported, recorded):
         command.add_argument(
             "--environment",
-            required=command is checked,
+            required=command is not imported,
             metavar="ENVIRONMENT",
             help="robot that executes the recordings, and its options, as for sgimd run: a name or module:attribute",
         )
-    imported.add_argument("--out", type=Path, required=True, metavar="FILE.npz", help="file to write")
+    for command in (imported, recorded):
+        command.add_argument("--out", type=Path, required=True, metavar="FILE.npz", help="file to write")
     imported.add_argument("--skip-unusable", action="store_true", help="leave out recordings that cannot be used")
     return parser
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Check or import demonstrations, and return the exit code 0.
+    """Check, import or record demonstrations, and return the exit code 0.
 
     Raises:
         ValueError: the source cannot be read, or some recordings cannot be used.
@@ -132,14 +137,18 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     options, of_robot = parser().parse_known_args(argv)
     importing = options.command == "import"
-    if importing and options.out.suffix != ".npz":
+    if options.command != "check" and options.out.suffix != ".npz":
         raise ValueError(f"--out must end in .npz, got {options.out}")
-    check_regular(options.source)
     task = None
     if options.environment:
         task = task_of(parse([f"--environment={options.environment}", *of_robot])[0])
     elif of_robot:
         raise ValueError(f"{of_robot[0]} is no option of sgimd demonstrations import, or needs --environment")
+    if options.command == "record":
+        assert task is not None
+        record_led(task, options.out)
+        return 0
+    check_regular(options.source)
     recordings = read_recordings(options, primitive_of(task.environment).ranges if task else None)
     if task is not None:
         recordings = _on_robot(task, recordings, options.source)
@@ -159,6 +168,36 @@ def main(argv: Sequence[str] | None = None) -> int:
         save_demonstrations(options.out, demonstrations)
         print(f"{options.out}: {len(demonstrations)} recordings, {demonstrations[0].trajectory.shape[1]} joints")
     return 0
+
+
+def record_led(task: Task, out: Path) -> None:
+    """Write movements of an arm that somebody leads into ``out``, one after the other, until the input ends.
+
+    Raises:
+        ValueError: nobody can lead this robot.
+        OSError: the file cannot be written.
+    """
+    robot, shown = task.environment, list[Demonstration]()
+    lead: Callable[[], Demonstration] | None = getattr(robot, "lead", None)
+    if lead is None:
+        raise ValueError(f"nobody can lead {type(robot).__name__} by hand; sgimd teach leads a simulated arm")
+    while True:
+        try:
+            input("Enter: torque goes off, lead the arm; Ctrl-D: done. ")
+        except EOFError:
+            return
+        demonstration = lead()
+        try:
+            times, joints = moving(demonstration.times, demonstration.trajectory)
+            demonstration = replace(demonstration, times=times, trajectory=joints)
+            misfit = misfit_of(robot, theta_of(task, demonstration), demonstration)
+        except ValueError as error:
+            print(f"not kept: {error}")
+            continue
+        shown.append(demonstration)
+        save_demonstrations(out, shown)
+        where = _point(demonstration.outcome)
+        print(f"{out}: movement {len(shown)}, {times[-1]:.3g} s, outcome {where}, misfit {misfit:.3f} rad")
 
 
 def read_recordings(options: argparse.Namespace, ranges: Box | None) -> list[Recording]:
@@ -274,12 +313,6 @@ def _point(point: Array) -> str:
 
 def _names(text: str) -> tuple[str, ...]:
     return tuple(name.strip() for name in text.split(",") if name.strip())
-
-
-def _units(text: str) -> dict[str, str]:
-    """Units by name of the joint; the name of a unit alone is ""."""
-    parts = [part.rpartition("=") for part in _names(text)]
-    return {joint.strip(): unit.strip() for joint, _, unit in parts}
 
 
 def _above_zero(text: str) -> float:

@@ -138,7 +138,7 @@ REFUSED = {
     "degrees": (degrees(ONE), NAMED, "a reads up to 28.65 in one.txt, more than a turn in rad; .* --unit a=deg"),
     "degrees of one joint": (degrees(ONE), f"{NAMED} --unit a=deg", "b reads up to 34.38 .* --unit b=deg"),
     "an unknown unit": (ONE, f"{NAMED} --unit a=turns", "the unit of a must be rad, deg or a range .*, got turns"),
-    "a range backwards": (ONE, f"{NAMED} --unit a=100:0", "the unit of a must be rad, deg or a range .*, got 100:0"),
+    "a range of nothing": (ONE, f"{NAMED} --unit a=5:5.0", "the unit of a must be rad, deg or a range .*, got 5:5.0"),
     "a range without a robot": (ONE, f"{NAMED} --unit a=0:100", "a=0:100 maps onto the range of a joint of a robot"),
     "a unit of no joint": (ONE, f"{NAMED} --unit c=deg", "no joint is named c; did you mean"),
     "stillness": (ONE.replace("0.3,0.4", "0.1,0.2").replace("0.5,0.6", "0.1,0.2"), f"{NAMED} --trim", "no joint moved"),

@@ -168,7 +168,7 @@ def understand(name, words):
     """Read the words of a command up to where it needs what earlier commands would have made."""
     if name == "run":
         parse(words)
-    elif name == "sweep":
+    elif name in ("sweep", "paper"):
         assert command(_call, [name, *words, "--dry-run"]) == 0
     elif name == "teach" and not (words and words[0].startswith("runs/")):  # it would serve until Ctrl-C
         importlib.import_module(f"sgimd_torch.{WORDS['command'][name]}").options_of(words)

@@ -14,7 +14,7 @@ import sgimd_torch
 
 PACKAGE = "sgimd_torch"
 ROWS = [  # a room imports only from rows above its own
-    {"spaces", "files", "options"},
+    {"spaces", "files", "options", "units"},
     {"memory", "environments"},
     {"parts", "demonstrations"},
     {"competence", "teachers", "evaluation", "goals", "searches", "figures"},
@@ -62,6 +62,7 @@ LIBRARIES = {  # rooms or single files that may import a library, by library
     "sklearn": {"rivals"},
     "ribs": {"rivals"},
     "pyarrow": {"demonstrations/lerobot"},
+    "lerobot": {"environments/lerobot"},
     "gymnasium": {"environments/from_gymnasium", "environments/to_gymnasium"},
 }
 WORLDS = {"environments"}

@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
@@ -69,11 +70,8 @@ def page(place: Path, variants: Sequence[Variant], baseline: str | None = None) 
     """
     reference = baseline_of(variants, baseline)
     runs = [run for variant in variants for run in variant.runs]
-    jinja = Environment(
-        loader=FileSystemLoader(Path(__file__).parent), autoescape=True, undefined=StrictUndefined, trim_blocks=True
-    )
-    jinja.filters |= {"interval": _interval}
-    html = jinja.get_template("template.html.j2").render(
+    return rendered(
+        "template.html.j2",
         place=place,
         variants=variants,
         single=runs[0] if len(runs) == 1 else None,
@@ -90,6 +88,15 @@ def page(place: Path, variants: Sequence[Variant], baseline: str | None = None) 
         provenance=provenance,
         unit=unit_of(variants),
     )
+
+
+def rendered(template: str, **values: Any) -> str:
+    """A template of this folder as HTML, filled with values; their texts are escaped."""
+    jinja = Environment(
+        loader=FileSystemLoader(Path(__file__).parent), autoescape=True, undefined=StrictUndefined, trim_blocks=True
+    )
+    jinja.filters |= {"interval": _interval}
+    html = jinja.get_template(template).render(**values)
     return html.encode(errors="backslashreplace").decode()  # a name may hold invalid characters
 
 

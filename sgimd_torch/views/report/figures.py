@@ -17,7 +17,7 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sgimd_torch.figures.axes import LEGEND, alike, limits, over_movements
+from sgimd_torch.figures.axes import LEGEND, alike, curve_in_band, limits, over_movements
 from sgimd_torch.figures.learning import COLOURS, interest_map, landing_points, map_after
 from sgimd_torch.figures.learning import misses as draw_misses
 from sgimd_torch.figures.save import STYLE as FILE_STYLE
@@ -80,24 +80,28 @@ def error_curves(figure: Figure, variants: Sequence[Variant], colours: Mapping[s
     if len(variants) > 1:
         figure.set_size_inches(6.8, 4.5)
     ax = figure.subplots()
-    for variant in variants:
-        n, colour, (centre, low, high) = len(variant.used), colours[variant.name], variant.curve
-        if n > 1 and variant.few:
-            when = np.broadcast_to(variant.evaluated_at, variant.errors.shape)
-            ax.scatter(when, variant.errors, s=12, color=colour, alpha=0.6, linewidths=0)
-        elif n > 1:
-            ax.fill_between(variant.evaluated_at, low, high, color=colour, alpha=0.2, linewidth=0)
-        if n > 1 and len(variants) == 1:
-            ax.plot(variant.evaluated_at, variant.errors.T, color=colour, linewidth=0.7, alpha=0.4)
-        label = f"{_curve_name(variant.label)} ({_seeds(n)})"
-        ax.plot(variant.evaluated_at, centre, "o-", color=colour, markersize=4.5, label=label)
-        if len(variants) == 1:
-            floor = variant.floors.mean(axis=0)
-            ax.plot(variant.evaluated_at, floor, "_--", color="black", linewidth=1.2, markersize=8, label="noise floor")
-    over_movements(ax, variants[0].space.in_unit("mean distance to benchmark goals"))
+    draw_curves(ax, variants, colours)
+    if len(variants) == 1:
+        (variant,) = variants
+        if len(variant.used) > 1:
+            ax.plot(variant.evaluated_at, variant.errors.T, color=colours[variant.name], linewidth=0.7, alpha=0.4)
+        floor = variant.floors.mean(axis=0)
+        ax.plot(variant.evaluated_at, floor, "_--", color="black", linewidth=1.2, markersize=8, label="noise floor")
     ax.set_ylim(bottom=0)
     handles = [line for line in ax.lines if not str(line.get_label()).startswith("_")]
     ax.legend(handles=handles, **LEGEND)
+
+
+def draw_curves(ax: Axes, variants: Sequence[Variant], colours: Mapping[str, str]) -> None:
+    """Draw the error curves of all variants; a variant with few seeds has a point for each seed, and no band."""
+    for variant in variants:
+        n, colour = len(variant.used), colours[variant.name]
+        if n > 1 and variant.few:
+            when = np.broadcast_to(variant.evaluated_at, variant.errors.shape)
+            ax.scatter(when, variant.errors, s=12, color=colour, alpha=0.6, linewidths=0)
+        label = f"{_curve_name(variant.label)} ({_seeds(n)})"
+        curve_in_band(ax, variant.evaluated_at, variant.curve, colour, label)
+    over_movements(ax, variants[0].space.in_unit("mean distance to benchmark goals"))
 
 
 curves = png(error_curves)

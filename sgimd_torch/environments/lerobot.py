@@ -1,0 +1,320 @@
+"""A robot arm on the table: any robot of the LeRobot package, or whatever has the calls of its class ``Robot``.
+
+    arm = LeRobotArm("so101_follower", port="/dev/ttyACM0", model="so101.xml", outcome="site:tip", units="deg")
+The model file says what theta and an outcome mean, as for `MujocoRobot`. So a run in MuJoCo can be the past of a run on
+the arm: ``--begin-with``. The arm connects at its first movement. Its torque is switched off at Ctrl-C, after an error
+of the arm, and when the process ends.
+"""
+
+from __future__ import annotations
+
+import atexit
+import pkgutil
+import signal
+import threading
+import time
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from functools import partial
+from importlib import import_module
+from typing import Any, ClassVar, Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sgimd_torch.environments.mujoco_robot import MujocoRobot
+from sgimd_torch.environments.protocol import SimulationError, check_movement, check_robot, reason_of, tried
+from sgimd_torch.options.catalogue import load_place, unknown_name_error
+from sgimd_torch.options.signature import with_keywords_of
+from sgimd_torch.spaces import Array, Demonstration, Failure, check_point
+from sgimd_torch.units import in_rad, units_from, units_of
+
+TRIES: Final = 4  # number of tries of a call whose packet is lost
+PAUSE: Final = 0.01  # s between two tries
+BLOCKED: Final = 0.3  # s after which a joint that is held back by ``step`` and does not move counts as stalled
+MOVED: Final = 0.02  # rad, least way of a joint that moves
+STILL: Final = 1.0  # s after which an arm that was led and does not move has been led to the end
+GENTLY: Final = 0.5  # share of ``speed`` on the way back to rest
+KEPT: Final = 0.9  # least share of the commands of ``rate`` that are sent without a warning
+OF_MODEL: Final = ("joints", "low", "high", "rest", "durations", "n_knots", "keyframe")
+
+
+class LeRobotArm:
+    """Robot arm on the table, driven by LeRobot; its model file says what movements and outcomes are.
+
+    The robot needs ``action_features`` with the names of its motors, ``is_connected``, ``connect()`` that switches
+    torque on, ``get_observation()`` of positions by motor, ``send_action(positions)`` and ``disconnect()`` that
+    switches torque off. A lost packet is an OSError. A ``bus``, of the robot or of each of its arms, is asked for
+    temperatures, and switches torque off first.
+
+    Args:
+        robot: LeRobot's name of the robot, such as so101_follower, or package.module:function of yours that makes one.
+        port: serial port of a robot of LeRobot, such as /dev/ttyACM0.
+        robot_id: name under which LeRobot keeps the calibration of this robot.
+        model: path of the MJCF or URDF file of the arm.
+        outcome: comma-separated places of the model at the end of a movement, such as site:tip or body:puck:xy.
+        seen_by: function (observation) -> outcome, such as camera:puck, that sees where the places really are; "" for
+            forward kinematics of the measured joints. If it fails, the movement has failed, but torque stays on.
+        units: units of the motors: rad, deg, or a range that maps onto the range of a joint, as in deg,gripper=0:100; a
+            range such as 90:-110 is that of a motor that turns the other way.
+        motors: names of the robot's motors, in the order of the joints; () for JOINT.pos or JOINT. Others hold still.
+        outcome_noise: standard deviation of outcomes if a movement is repeated.
+        settle: time (s) between the end of a movement and its outcome, and again at rest before the next movement.
+        rate: commands per second.
+        speed: highest speed of a command (rad/s).
+        step: largest distance (rad) between a command and the measured position. A joint that stays behind stalls.
+        heat: highest temperature of a motor (degrees C).
+        clock: object with ``monotonic()`` and ``sleep(seconds)``, by default the module ``time``.
+
+    Raises:
+        ValueError: the model or an option cannot be used.
+        ImportError: LeRobot is not installed.
+    """
+
+    FOUND_OPTIONS: ClassVar = ("low", "high", "rest")
+    at_once = 1
+
+    @with_keywords_of(MujocoRobot, *OF_MODEL)
+    def __init__(
+        self,
+        robot: str = "",
+        *,
+        port: str = "",
+        robot_id: str = "",
+        model: str = "",
+        outcome: str = "",
+        seen_by: str = "",
+        units: str = "",
+        motors: tuple[str, ...] = (),
+        outcome_noise: float = 0.005,
+        settle: float = 0.5,
+        rate: float = 50.0,
+        speed: float = 3.0,
+        step: float = 0.3,
+        heat: float = 60.0,
+        clock: Any = time,
+        **of_model: Any,
+    ) -> None:
+        for name, value in (("rate", rate), ("speed", speed), ("step", step), ("heat", heat)):
+            if not 0 < value < np.inf:
+                raise ValueError(f"{name} must be finite and above 0, got {value}")
+        for name, text, example in (("robot", robot, "so101_follower"), ("units", units, "deg,gripper=0:100")):
+            if not text:
+                raise ValueError(f"{name} is missing, such as {example}")
+        self._make = load_place("robot", robot) if ":" in robot else partial(_of_lerobot, robot, port, robot_id)
+        self._see = load_place("seen_by", seen_by) if seen_by else None
+        self.robot, self._buses = self._made()
+        self._twin = twin = MujocoRobot(model, outcome=outcome, outcome_noise=outcome_noise, settle=settle, **of_model)
+        self.contexts, self.policies, self.outcomes, self.rest = twin.contexts, twin.policies, twin.outcomes, twin.rest
+        self.outcome_noise, self.joints, self.primitive = outcome_noise, twin.joints, twin.primitive
+        self.correspondence, self.files, self.remarks = twin.correspondence, twin.files, twin.remarks
+        self.found_options = {name: twin.found_options[name] for name in self.FOUND_OPTIONS}
+        ranges, unit_of = twin.primitive.ranges, units_of(self.joints, units_from(units))
+        if not self.joints or ranges is None:
+            raise ValueError(f"the actuators of {model} do not take positions of joints, as the motors of an arm do")
+        if not seen_by and not twin.carries_outcome:
+            raise ValueError(f"the joints do not say where {outcome} is; seen_by names a function that sees it")
+        known, self._motors = self.robot.action_features, list[str]()
+        for name in motors or self.joints:
+            self._motors.append(f"{name}.pos" if f"{name}.pos" in known else name)
+            if self._motors[-1] not in known:
+                raise unknown_name_error("motor", name, known, "; motors names one for each joint, in their order")
+        if len(self._motors) != len(self.joints):
+            raise ValueError(f"motors must name one for each of {', '.join(self.joints)}, got {', '.join(motors)}")
+        if lacking := [joint for joint in self.joints if joint not in unit_of]:
+            raise ValueError(f"units has none for {', '.join(lacking)}; deg,gripper=0:100 is deg for all but gripper")
+        sides = zip(self.joints, ranges.low.tolist(), ranges.high.tolist(), strict=True)
+        self._scales, self._shifts = np.array([in_rad(name, unit_of[name], (low, high)) for name, low, high in sides]).T
+        self.settle, self.rate, self.speed, self.step, self.heat = settle, rate, speed, step, heat
+        self._clock, self._is_slow, self._signal = clock, False, 0
+        self._command: Array | None = None  # the last one (rad); None: not connected
+        check_robot(self)
+
+    def observe(self, rng: np.random.Generator) -> Array:
+        """``(0,)``, no context."""
+        return self.contexts.sample(rng)
+
+    def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
+        """``(outcome_dim,)``, the outcome of one movement, after which the arm goes back to rest; see `Environment`.
+
+        Raises:
+            SimulationError: a joint stalls, a motor is hot, a signal came, or the outcome was not seen.
+            OSError: the arm does not answer.
+        """
+        _, theta = check_movement(self, context, theta)
+        with self._torque_off_after_an_error():
+            if self._command is None:
+                self._connect()
+                self._follow(self._twin.start[None], GENTLY * self.speed)
+            self._follow(self._twin.commanded(theta), self.speed)
+            outcome = tried("outcome", self.outcomes.dim, self._outcome)
+            self._follow(self._twin.start[None], GENTLY * self.speed)
+        if isinstance(outcome, Failure):
+            raise SimulationError(f"the outcome was not seen: {outcome.reason}")
+        return outcome
+
+    def lead(self) -> Demonstration:
+        """A movement that somebody leads by hand, with torque off, from now until the arm has moved and is still.
+
+        Raises:
+            ValueError: the robot has no bus whose torque can be switched off.
+            SimulationError, OSError: a signal came, or the arm does not answer.
+        """
+        if not self._buses:
+            raise ValueError("the robot has no bus with disable_torque(); record with its own program instead")
+        times, postures, moved_at, before = list[float](), list[Array](), np.inf, None
+        with self._torque_off_after_an_error():
+            self._connect()
+            for bus in self._buses:
+                bus.disable_torque()
+            begun = self._clock.monotonic()
+            while not times or not times[-1] - moved_at > STILL:
+                self._check_signal()
+                times.append(self._clock.monotonic() - begun)
+                postures.append(self._measured(self._answer(self.robot.get_observation)))
+                if before is None or np.abs(postures[-1] - before).max() > MOVED:
+                    moved_at, before = np.inf if before is None else times[-1], postures[-1]
+                self._clock.sleep(max(0.0, begun + len(times) / self.rate - self._clock.monotonic()))
+            outcome = self._outcome()
+        self.release()
+        return Demonstration(np.zeros(0), np.array(times), np.array(postures), outcome)
+
+    def release(self) -> None:
+        """Switch torque off and disconnect; the next movement connects again."""
+        atexit.unregister(self.release)
+        self._command = None
+        switches: list[Callable[[], Any]] = [*(bus.disable_torque for bus in self._buses), self.robot.disconnect]
+        errors = list[BaseException]()
+        for switch_off in switches:
+            try:
+                switch_off()
+            except BaseException as error:  # also after Ctrl-C the other switches are still to be tried
+                errors.append(error)
+        if errors:  # this driver may believe for good that it is connected
+            self.robot, self._buses = self._made()
+        if len(errors) == len(switches):
+            told = f"torque may still be on, switch off the power: {reason_of(errors[-1])}"
+            warnings.warn(told, RuntimeWarning, stacklevel=2)
+
+    def _made(self) -> tuple[Any, list[Any]]:
+        """A robot, and its buses or those of its arms."""
+        robot = self._make()
+        return robot, [part.bus for part in (robot, *vars(robot).values()) if hasattr(part, "bus")]
+
+    @contextmanager
+    def _torque_off_after_an_error(self) -> Iterator[None]:
+        """A block of movements; after an error torque is off. A signal is handled when it is off."""
+        self._signal = 0
+
+        def note(signum: int, frame: object) -> None:
+            if self._signal:  # the arm hangs
+                raise KeyboardInterrupt
+            self._signal = signum
+
+        heard = (signal.SIGINT, signal.SIGTERM) if threading.current_thread() is threading.main_thread() else ()
+        before = [(signum, signal.signal(signum, note)) for signum in heard]
+        try:
+            yield
+        except BaseException:
+            self.release()
+            raise
+        finally:
+            for signum, handler in before:
+                signal.signal(signum, handler)
+            if self._signal:
+                signal.raise_signal(self._signal)
+
+    def _check_signal(self) -> None:
+        if self._signal:
+            raise SimulationError(f"stopped by {signal.Signals(self._signal).name} in mid-movement; torque is off")
+
+    def _connect(self) -> None:
+        atexit.register(self.release)
+        if not self.robot.is_connected:
+            self.robot.connect()
+        observation, names = self._answer(self.robot.get_observation), self.robot.action_features
+        self._held = {name: 0.0 if name.endswith(".vel") else observation[name] for name in names}
+        self._command = self._measured(observation)
+
+    def _follow(self, commands: Array, speed: float) -> None:
+        """Play commands ``(n_steps, n_joints)`` (rad), one for each timestep of the model; settle at the last."""
+        assert self._command is not None
+        timestep, clock, ticks = self._twin.model.opt.timestep, self._clock, 0
+        moving = np.flatnonzero((commands != commands[-1]).any(axis=1)).max(initial=-1)
+        begun = then = due = away_at = clock.monotonic()
+        free_at, free_posture = np.full(len(self.joints), begun), np.full(len(self.joints), np.inf)
+        while True:
+            self._check_signal()
+            now, measured = clock.monotonic(), self._measured(self._answer(self.robot.get_observation))
+            row = min(int((now - begun) / timestep), len(commands) - 1)
+            way = speed * (now - then if ticks else 1 / self.rate)
+            command = self._command + np.clip(commands[row] - self._command, -way, way)
+            self._command = np.clip(command, measured - self.step, measured + self.step)
+            values = ((self._command - self._shifts) / self._scales).tolist()
+            action = {**self._held, **dict(zip(self._motors, values, strict=True))}
+            self._answer(partial(self.robot.send_action, action))
+            free = (self._command == command) | (np.abs(measured - free_posture) > MOVED)
+            free_at[free], free_posture[free] = now, measured[free]
+            for k in np.flatnonzero(now - free_at > BLOCKED):
+                told = f"{self.joints[k]} stalls at {measured[k]:.3g} rad on its way to {commands[row, k]:.3g}"
+                raise SimulationError(f"{told}; torque is off")
+            ticks, then = ticks + 1, now
+            if row <= moving or not np.allclose(self._command, commands[-1], atol=1e-6):
+                away_at = now
+            due = max(due + 1 / self.rate, clock.monotonic())
+            clock.sleep(due - clock.monotonic())
+            if now - away_at >= self.settle:
+                break
+        self._check_heat()
+        sent = (ticks - 1) / max(now - begun, 1e-9)
+        if ticks > 1 and sent < KEPT * self.rate and not self._is_slow:
+            self._is_slow = True
+            told = f"the arm takes {sent:.0f} commands a second, not {self.rate:g}; movements keep their times"
+            warnings.warn(f"{told} with fewer commands: --environment.rate", RuntimeWarning, stacklevel=2)
+
+    def _check_heat(self) -> None:
+        for bus in self._buses:
+            try:
+                temperatures = self._answer(partial(bus.sync_read, "Present_Temperature", normalize=False))
+            except (AttributeError, KeyError, NotImplementedError, TypeError, ValueError):  # this bus does not know it
+                continue
+            for motor, degrees in temperatures.items():
+                if degrees > self.heat:
+                    raise SimulationError(f"{motor} is at {degrees:g} degrees C, above {self.heat:g}; torque is off")
+
+    def _outcome(self) -> Array:
+        """``(outcome_dim,)``, where the places are now."""
+        observation = self._answer(self.robot.get_observation)
+        return self._twin.outcome_at(self._measured(observation)) if self._see is None else self._see(observation)
+
+    def _measured(self, observation: Mapping[str, Any]) -> Array:
+        """``(n_joints,)`` rad."""
+        values = [float(observation[motor]) for motor in self._motors]
+        return check_point("joints", self._scales * values + self._shifts, len(self.joints))
+
+    def _answer(self, call: Callable[[], Any]) -> Any:
+        """The result of a call of the robot, which is tried again if a packet is lost."""
+        for _ in range(TRIES - 1):
+            with suppress(OSError):
+                return call()
+            self._clock.sleep(PAUSE)
+        return call()
+
+
+def _of_lerobot(name: str, port: str, robot_id: str) -> Any:
+    """The robot of LeRobot with this name."""
+    try:
+        from lerobot import robots  # an optional dependency
+    except ImportError as error:
+        raise ImportError(f"{name} is a robot of LeRobot: pip install 'sgimd-torch[arm]' ({error})") from error
+    for module in pkgutil.iter_modules(robots.__path__):  # each registers its robots; some need drivers of their own
+        with suppress(ImportError):
+            import_module(f"{robots.__name__}.{module.name}")
+    known = robots.RobotConfig.get_known_choices()
+    if name not in known:
+        raise unknown_name_error("robot", name, known, "; or package.module:function")
+    try:
+        return robots.make_robot_from_config(known[name](port=port, id=robot_id or None))
+    except TypeError as error:
+        raise ValueError(f"{name} is not made by a port alone ({error}): write a function, mymodule:make") from error

@@ -1,0 +1,144 @@
+"""The paper's figures from tiny runs: which runs are made, every figure and table of the page, and the statistics."""
+
+import base64
+import io
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from PIL import Image
+
+from pages import Page, rows_of
+from sgimd_torch.figures.learning import COLOURS
+from sgimd_torch.options.command_line import main as live
+from sgimd_torch.options.config import words
+from sgimd_torch.runs.read import read_run
+from sgimd_torch.runs.signals import command
+from sgimd_torch.views.report import paper, paper_figures
+from sgimd_torch.views.report.replication import Replication
+from sgimd_torch.views.variants import Variant
+
+FIVE = ["Random", "SAGG-RIAC", "Observation", "Imitation", "SGIM-D"]
+FIGURES = [
+    *("Error curves of the five learners", "Error curves by demonstrator"),
+    "Histograms of outcomes of Random, SAGG-RIAC and SGIM-D",
+    *("Trajectories of joint 1 by demonstrator", "Means of the parameters of theta by demonstrator"),
+    *("Error curves in both task spaces", "Goals of SAGG-RIAC and SGIM-D in the larger task space"),
+    "Outcomes of three policies, each repeated",
+]
+
+
+@pytest.fixture(scope="module")
+def tiny(tmp_path_factory, benchmark):
+    """Folder of the runs and of the page, options, and the plan; the runs are made in this process."""
+    out = tmp_path_factory.mktemp("paper")
+    given = f"--movements 40 --evaluate-at 20 --repeats 0 --benchmark {benchmark}".split()
+    plan = paper.plan_of(out, given, ours=False)
+    for config in plan.values():
+        assert command(live, words(config)) == 0
+    return out, [str(out), "--seeds", "0", *given], plan
+
+
+@pytest.fixture(scope="module")
+def study(tiny):
+    plan = tiny[2]
+    runs = {name: Variant(name, [read_run(config.directory)]) for name, config in plan.items()}
+    return Replication(plan["sgim-d"], runs)
+
+
+@pytest.fixture(scope="module")
+def page(tiny):
+    assert command(paper.main, tiny[1]) == 0
+    return (tiny[0] / "paper.html").read_text(encoding="utf-8")
+
+
+def drawn(draw, *args):
+    draw.__wrapped__(figure := Figure(), *args)
+    return figure
+
+
+def test_the_learners_are_those_of_the_paper_unless_ours_are_wanted(tiny):
+    plan, ours = tiny[2], paper.plan_of(tiny[0], [], ours=True)
+    assert {name: config["inverse"] for name, config in plan.items()} == dict.fromkeys(plan, "paper")
+    assert {name: config["inverse"] for name, config in ours.items()} == dict.fromkeys(plan, "process")
+    assert [plan[name].algorithm for name in ("sagg-riac", "sgim-d-large")] == ["sagg-riac-letter", "sgim-d-letter"]
+    assert [config.demonstrations.stem[-1] for config in plan.values() if config.demonstrations] == [*"111222"]
+    assert [name for name, config in plan.items() if config["environment.task_space"] == 100] == [
+        *("sagg-riac-large", "sgim-d-large")
+    ]
+
+
+def test_the_page_waits_for_the_last_run(tiny, capsys):
+    _, options, _ = tiny
+    assert command(paper.main, [*options, "--seeds", "0-1", "--dry-run"]) == 0
+    said = capsys.readouterr()
+    assert len(said.out.splitlines()) == 13
+    assert "13 of 26 are left" in said.err
+    assert command(paper.main, [*options, "--seeds", "0-1", "--shard", "1/2"]) == 0  # finished before
+    assert capsys.readouterr().out == ""
+
+
+def test_every_figure_is_on_the_page_beside_its_statement_and_nothing_is_fetched(page):
+    elements = Page(page).elements
+    images = [given for name, given in elements if name == "img"]
+    assert [image["alt"] for image in images] == FIGURES
+    for image in images:
+        with Image.open(io.BytesIO(base64.b64decode(image["src"].partition(",")[2]))) as picture:
+            assert min(picture.size) >= 400
+    assert not re.search(r"https?:|file:|<script", re.sub(r"base64,[A-Za-z0-9+/=]*", "", page))
+    assert [text for text in Page(page).all("strong") if text.startswith("The paper")] == [
+        f"The paper ({place})."
+        for place in (
+            *("section 6.1, fig. 8a", "section 6.3, fig. 8b", "section 6.2, fig. 8c", "section 6.3, fig. 8d"),
+            *("section 6.3", "section 6.4, fig. 8e", "section 6.5, fig. 8f", "section 4.5, fig. 6"),
+        )
+    ]
+
+
+def test_numbers_are_those_of_the_runs(page, study):
+    errors = {name: variant.runs[0].at(40) for name, variant in study.variants.items()}
+    rows = {row[0]: row[1:] for row in rows_of(page, "Errors after the last movement, divided by each other")}
+    assert rows["SGIM-D / Random"] == ["½", f"{errors['sgim-d'] / errors['random']:.2f}"]
+    rows = {row[0]: row[1:] for row in rows_of(page, "Errors after the last movement (m)")}
+    names = ("imitation-demonstrator-1", "imitation-demonstrator-2", "imitation")
+    assert rows["Imitation"] == [f"{errors[name]:.3f}" for name in names]
+    ratio = errors["sgim-d-large"] / errors["sgim-d"]
+    assert study.large().rows[2][1:] == (f"{errors['sgim-d']:.3f}", f"{errors['sgim-d-large']:.3f}", f"{ratio:.2f}")
+
+
+def test_only_demonstrator_3_moves_each_joint_in_one_direction(study):
+    assert [row[3] == "100%" for row in study.monotonic().rows] == [False, False, True]
+
+
+def test_repeated_policies_scatter_only_by_the_noise_of_the_rod(study):
+    assert study.repeated.shape == (20, 20, 2)
+    assert (study.repeated.std(axis=1) > 0).all()
+    without = paper.plan_of(Path(), ["--environment.noise", "0"], ours=False)["sgim-d"]
+    assert (np.ptp(Replication(without, {}).repeated, axis=1) == 0).all()
+
+
+def test_parameters_with_other_means_or_spreads_are_counted(tiny):
+    rng = np.random.default_rng(0)
+    one, two, three = rng.uniform(size=(3, 300, 25))
+    two[:, 0] += 0.3
+    three[:, 1:3] = 0.5 + 0.1 * (three[:, 1:3] - 0.5)
+    other = Replication(tiny[2]["sgim-d"], {})
+    other.taught, other.demonstrated = {1: one, 2: two, 3: three}, {1: one}
+    of_random, of_taught = other.anova().rows
+    assert (of_random[1], of_random[4]) == ("0 of 25", "0 of 25")
+    assert (of_taught[1], of_taught[4]) == ("1 of 25", "2 of 25")
+
+
+def test_curves_have_the_colours_of_their_learners_and_histograms_one_scale(study):
+    panels = {"": {"sgim-d": "sgim-d-large", "random": "random"}}
+    (ax,) = drawn(paper_figures._panels, study, panels).axes
+    assert [line.get_color() for line in ax.lines] == [COLOURS["sgim-d"], COLOURS["random"]]
+    figure = drawn(paper_figures.outcomes, study)
+    *maps, _ = figure.axes
+    assert len({mesh.get_clim() for ax in maps for mesh in ax.collections}) == 1
+    assert sum(mesh.get_array().sum() for ax in maps for mesh in ax.collections) == 3 * 40
+    whole, near = drawn(paper_figures.goals, study).axes[:2]
+    assert len(whole.lines[0].get_xdata()) == len(study.chosen("sagg-riac"))
+    assert near.get_xlim() == (-100, 100)
