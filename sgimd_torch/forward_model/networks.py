@@ -63,7 +63,7 @@ class Perceptrons(torch.nn.Module):
         generator: random stream of the first weights.
         widths: number of units of each hidden layer.
         activation: name of the activation function.
-        noise_heads: see `ForwardModel`.
+        noise_heads: false: each output has one noise for all inputs.
     """
 
     def __init__(
@@ -116,7 +116,7 @@ class OwnNetworks(torch.nn.Module):
         dims: dimensions of context, theta and outcome.
         members: number of networks.
         generator: random stream of the first weights.
-        noise_heads: see `ForwardModel`; a network that returns a mean alone has none.
+        noise_heads: false: each outcome has one noise for all inputs, as if the network returned a mean alone.
 
     Raises:
         ValueError: what is made is no Module, cannot be copied, or returns other shapes or numbers that are not finite.
