@@ -264,18 +264,18 @@ class ForwardModel(LightningModule):
         Raises:
             ValueError: the memory has other dimensions, or fewer exemplars than the model was trained on.
         """
+        if self.awaited:
+            if len(memory) == int(self.awaited["state_dict"]["n_seen"]):
+                self.load_state_dict(self.awaited["state_dict"])
+                self.on_load_checkpoint(self.awaited)
+                self.awaited = {}
+            return None
         sizes = {name: getattr(memory, name) for name in self.sizes}
         if sizes != self.sizes:
             raise ValueError(f"the model has dimensions {self.sizes}, the memory {sizes}; is it another robot's?")
         n, seen = len(memory), int(self.n_seen)
         if n < seen:
             raise ValueError(f"the model was trained on {seen} exemplars, the memory has {n}; is it another run's?")
-        if self.awaited:
-            if n == int(self.awaited["state_dict"]["n_seen"]):
-                self.load_state_dict(self.awaited["state_dict"])
-                self.on_load_checkpoint(self.awaited)
-                self.awaited = {}
-            return None
         if n < _FEWEST_EXEMPLARS or n - seen < self.every:
             return None
         if not seen and not np.ptp(memory.outcomes, axis=0).any():  # no movement has had an effect yet
