@@ -163,22 +163,24 @@ class LeRobotArm:
         """
         if not self._buses:
             raise ValueError("the robot has no bus with disable_torque(); record with its own program instead")
-        times, postures, moved_at, before = list[float](), list[Array](), np.inf, None
+        times, postures, moves, before = list[float](), list[Array](), list[int](), np.full(len(self.joints), np.inf)
         with self._torque_off_after_an_error():
             self._connect()
             for bus in self._buses:
                 bus.disable_torque()
             begun = self._clock.monotonic()
-            while not times or not times[-1] - moved_at > STILL:
+            while len(moves) < 2 or times[-1] - times[moves[-1]] < STILL:
                 self._check_signal()
                 times.append(self._clock.monotonic() - begun)
                 postures.append(self._measured(self._answer(self.robot.get_observation)))
-                if before is None or np.abs(postures[-1] - before).max() > MOVED:
-                    moved_at, before = np.inf if before is None else times[-1], postures[-1]
+                if np.abs(postures[-1] - before).max() > MOVED:  # the first one, too
+                    moves.append(len(times) - 1)
+                    before = postures[-1]
                 self._clock.sleep(max(0.0, begun + len(times) / self.rate - self._clock.monotonic()))
             outcome = self._outcome()
         self.release()
-        return Demonstration(np.zeros(0), np.array(times), np.array(postures), outcome)
+        led = slice(moves[1] - 1, moves[-1] + 1)
+        return Demonstration(np.zeros(0), np.subtract(times[led], times[led.start]), np.array(postures[led]), outcome)
 
     def release(self) -> None:
         """Switch torque off and disconnect; the next movement connects again."""

@@ -26,6 +26,7 @@ from sgimd_torch.record import Dims, Record, RunError
 from sgimd_torch.runs.signals import say
 
 RUN_FILE: Final = "run.sqlite"
+CODE: Final = (*WORDS, "evaluated_by", "robot", "seen_by")  # last words of options that may name a place of code
 THREADS: Final = "environment.threads"
 DEVICE: Final = "inverse.accelerator"
 # Settings in which runs may differ: they name, show or speed up a run.
@@ -229,7 +230,7 @@ def sources(config: Config, robot: Environment) -> dict[str, str]:
 
 def code_of(settings: Mapping[str, Any]) -> list[str]:
     """Places ``package.module:attribute`` in ``settings`` that are a user's own code."""
-    named = [value for name, value in settings.items() if name.rpartition(".")[2] in (*WORDS, "evaluated_by")]
+    named = [value for name, value in settings.items() if name.rpartition(".")[2] in CODE]
     words = [word for value in named for word in (value if isinstance(value, list) else [value])]
     return sorted({word for word in words if isinstance(word, str) and ":" in word and word not in PLACES})
 

@@ -38,7 +38,7 @@ from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
 from sgimd_torch.demonstrations.columns import ColumnNames, Recording
 from sgimd_torch.demonstrations.fit import beyond_limits, misfit_of
 from sgimd_torch.demonstrations.text import read_text
-from sgimd_torch.demonstrations.units import in_units, moving, paced
+from sgimd_torch.demonstrations.units import in_units, paced
 from sgimd_torch.environments.protocol import Replaying, SimulationError, primitive_of
 from sgimd_torch.files import check_regular
 from sgimd_torch.options.build import task_of
@@ -188,8 +188,6 @@ def record_led(task: Task, out: Path) -> None:
             return
         demonstration = lead()
         try:
-            times, joints = moving(demonstration.times, demonstration.trajectory)
-            demonstration = replace(demonstration, times=times, trajectory=joints)
             misfit = misfit_of(robot, theta_of(task, demonstration), demonstration)
         except ValueError as error:
             print(f"not kept: {error}")
@@ -197,7 +195,9 @@ def record_led(task: Task, out: Path) -> None:
         shown.append(demonstration)
         save_demonstrations(out, shown)
         where = _point(demonstration.outcome)
-        print(f"{out}: movement {len(shown)}, {times[-1]:.3g} s, outcome {where}, misfit {misfit:.3f} rad")
+        print(
+            f"{out}: movement {len(shown)}, {demonstration.times[-1]:.3g} s, outcome {where}, misfit {misfit:.3f} rad"
+        )
 
 
 def read_recordings(options: argparse.Namespace, ranges: Box | None) -> list[Recording]:

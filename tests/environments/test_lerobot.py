@@ -7,15 +7,16 @@ from functools import partial
 import numpy as np
 import pytest
 
-import table
+import arms
+from arms import interrupt, on_table, write
 from sgimd_torch import MujocoRobot, SimulationError, stream
 from sgimd_torch.__main__ import _call
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.environments.lerobot import BLOCKED, LeRobotArm
 from sgimd_torch.environments.protocol import check_robot
+from sgimd_torch.runs.directory import code_of
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.signals import command
-from table import interrupt, on_table, write
 
 NONE, RNG = np.zeros(0), stream(0, "arm")
 FAR = np.append(np.repeat([1.0, 0.8, 0.6], 4), 0.0)  # a theta that bends all joints at once
@@ -142,7 +143,7 @@ def test_a_function_sees_the_outcome_and_when_it_fails_the_arm_goes_back_with_it
 
 REFUSED = {
     "robot is missing": {"robot": ""},
-    "robot: table has no robt": {"robot": "table:robt"},
+    "robot: arms has no robt": {"robot": "arms:robt"},
     "so101 is a robot of LeRobot: pip install": {"robot": "so101"},
     "units is missing": {"units": ""},
     "units has none for joint0, joint2": {"units": "joint1=deg"},
@@ -154,11 +155,16 @@ REFUSED = {
 }
 
 
+def test_code_that_drives_or_sees_the_arm_is_executed_only_if_it_is_trusted():
+    settings = {"environment": "lerobot", "environment.robot": "lab:make", "environment.seen_by": "camera:puck"}
+    assert code_of(settings) == ["camera:puck", "lab:make"]
+
+
 @pytest.mark.parametrize("message", REFUSED)
 def test_what_cannot_work_is_refused_before_anything_moves(model, message):
     _, on = on_table(model)
     given = {
-        "robot": "table:make",
+        "robot": "arms:make",
         "units": "deg",
         "outcome": "site:tip:x",
         "low": (-1.0,),
@@ -181,10 +187,10 @@ def hand(time):
 
 def test_a_movement_led_by_hand_becomes_a_lesson(model, tmp_path, monkeypatch, capsys):
     arm, on = on_table(model)
-    monkeypatch.setattr(table, "led", lambda: arm, raising=False)
+    monkeypatch.setattr(arms, "led", lambda: arm, raising=False)
     monkeypatch.setattr("sys.stdin", io.StringIO("\n"))
     on.hand = hand
-    assert sgimd("demonstrations", "record", "--environment", "table:led", "--out", tmp_path / "led.npz") == 0
+    assert sgimd("demonstrations", "record", "--environment", "arms:led", "--out", tmp_path / "led.npz") == 0
     assert "led.npz: movement 1, 1.44 s, outcome (0.222, 0.516), misfit 0.004 rad" in capsys.readouterr().out
     assert not on.torque
     (shown,) = load_demonstrations(tmp_path / "led.npz")
@@ -198,14 +204,14 @@ def test_a_movement_led_by_hand_becomes_a_lesson(model, tmp_path, monkeypatch, c
 def test_a_run_that_begins_with_its_simulator_and_is_stopped_in_mid_movement_goes_on(tmp_path, monkeypatch):
     model = write(tmp_path / "model.xml")
     arm, on = on_table(model, write(tmp_path / "real.xml", (0.21, 0.19, 0.2), (2.0, -3.0, 1.0)))
-    monkeypatch.setattr(table, "lab", lambda: arm, raising=False)
+    monkeypatch.setattr(arms, "lab", lambda: arm, raising=False)
     monkeypatch.chdir(tmp_path)
     often = "--evaluate-at [] --movements"
     simulated = "--environment.model model.xml --environment.outcome site:tip:xy --environment.durations 1,2"
     box = "--environment.low=-0.7,-0.7 --environment.high=0.7,0.7"
     assert sgimd(*f"run --environment mujoco {simulated} {box} {often} 60 --out simulated".split()) == 0
     past = "--begin-with simulated/practice/seed-000/run.sqlite"
-    words = f"run --environment table:lab {often} 12 {past} --name real".split()
+    words = f"run --environment arms:lab {often} 12 {past} --name real".split()
     on.events[20.0] = interrupt
     assert sgimd(*words) == 130
     assert on.switched_off == pytest.approx(20.0, abs=QUIET)

@@ -21,6 +21,7 @@ from sgimd_torch.views.report.replication import BY, SMALL, TILE, Replication
 THREE: Final = ("random", "sagg-riac", "sgim-d")
 OF_DEMONSTRATOR: Final = {1: "#0072b2", 2: "#e69f00", 3: "#d55e00"}
 EXAMPLES: Final = 2  # number of runs of each learner with a histogram
+WITHIN: Final = 0.99  # share of outcomes that a histogram shows
 
 
 def five_learners(study: Replication) -> str:
@@ -49,9 +50,9 @@ def _panels(figure: Figure, study: Replication, panels: Mapping[str, Mapping[str
         variants = [study.variants[name] for name in names.values()]
         draw_curves(ax, variants, {name: COLOURS[learner] for learner, name in names.items()})
         ax.set_title(title)
-        ax.set_ylim(bottom=0)
         if ax is not axes[0]:
             ax.set_ylabel("")
+    axes[0].set_ylim(bottom=0)  # after all curves, because it ends the automatic scale
     lines = axes[0].lines
     figure.legend(
         lines,
@@ -66,7 +67,8 @@ def _panels(figure: Figure, study: Replication, panels: Mapping[str, Mapping[str
 def outcomes(figure: Figure, study: Replication) -> None:
     """Histograms of outcomes side by side: a column for each learner, a row for each of two runs."""
     variants = [study.variants[name] for name in THREE]
-    half = np.ceil(10 * max(float(np.abs(variant.landed).max()) for variant in variants)) / 10
+    everywhere = np.abs(np.concatenate([variant.landed for variant in variants])).max(axis=1)
+    half = np.ceil(10 * float(np.quantile(everywhere, WITHIN))) / 10
     plane = replace(variants[0].space, low=np.full(2, -half), high=np.full(2, half))
     (section,), n = sections(plane), min(EXAMPLES, *(len(variant.runs) for variant in variants))
     figure.set_size_inches(12, 0.4 + 4 * n)
@@ -74,7 +76,7 @@ def outcomes(figure: Figure, study: Replication) -> None:
     meshes = []
     for column, (name, variant) in enumerate(zip(THREE, variants, strict=True)):
         for ax, run in zip(axes[:, column], variant.runs[:n], strict=True):
-            landed = run.outcomes[np.isfinite(run.outcomes).all(axis=1)]
+            landed = run.outcomes[plane.contains(run.outcomes)]
             shown = np.array([demonstration.outcome for demonstration in run.demonstrations])
             crosses = shown if len(shown) else None
             meshes.append(landing_points(ax, landed, plane, section, demonstrated=crosses, side=TILE))

@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 
 from sgimd_torch.environments.lerobot import LeRobotArm
+from sgimd_torch.options.signature import with_keywords_of
 
 
 class Clock:
@@ -26,14 +27,14 @@ class Clock:
         self.now += seconds
 
 
-def write(path, lengths=(0.2, 0.2, 0.2), offsets=(0.0, 0.0, 0.0)):
-    """A model of a planar arm with joints joint0, joint1, ..., whose zeros are shifted by ``offsets`` (degrees)."""
+def write(path, lengths=(0.2, 0.2, 0.2), offsets=(0.0, 0.0, 0.0), names=("joint0", "joint1", "joint2")):
+    """A model of a planar arm, whose joints have their zeros shifted by ``offsets`` (degrees)."""
     bodies, ends, x = "", "", 0
-    for k, (length, offset) in enumerate(zip(lengths, offsets, strict=True)):
-        bodies += f'<body pos="{x} 0 .1" euler="0 0 {offset}"><joint name="joint{k}" axis="0 0 1" range="-100 100"/>'
+    for name, length, offset in zip(names, lengths, offsets, strict=True):
+        bodies += f'<body pos="{x} 0 .1" euler="0 0 {offset}"><joint name="{name}" axis="0 0 1" range="-100 100"/>'
         bodies += f'<geom type="capsule" fromto="0 0 0 {length} 0 0" size=".02"/>'
         ends, x = ends + "</body>", length
-    servos = "".join(f'<position joint="joint{k}" kp="60" kv="6"/>' for k in range(len(lengths)))
+    servos = "".join(f'<position joint="{name}" kp="60" kv="6"/>' for name in names)
     path.write_text(
         '<mujoco><compiler autolimits="true"/><option timestep=".005" integrator="implicitfast" gravity="0 0 0"/>'
         '<default><joint damping="1"/><geom contype="0" conaffinity="0"/></default>'
@@ -158,7 +159,13 @@ def on_table(path, built=None, *, of_arm=(), **options):
     clock = Clock()
     LIVE.append(TableArm(built or path, clock, **dict(of_arm)))
     given = {"outcome": "site:tip:xy", "units": "deg", "low": (-0.7, -0.7), "high": (0.7, 0.7), "durations": (1.0, 2.0)}
-    return LeRobotArm("table:make", model=str(path), clock=clock, **{**given, **options}), LIVE[-1]
+    return LeRobotArm("arms:make", model=str(path), clock=clock, **{**given, **options}), LIVE[-1]
+
+
+@with_keywords_of(LeRobotArm)
+def bench(**options):
+    """The arm that lies on the table, by the options of the command line."""
+    return LeRobotArm(**{**options, "robot": "table:make", "clock": LIVE[-1].clock})
 
 
 def interrupt():
