@@ -70,12 +70,12 @@ gradient search: errors at anchors are added | forward_model/anchored.py | forwa
     return landing + correction, ==> return landing - correction,
 gradient search: no penalty of the variance | forward_model/anchored.py | forward_model/test_anchored.py
     ((landing - goals) ** 2).sum(dim=-1) + variance ==> ((landing - goals) ** 2).sum(dim=-1) + 0 * variance
-training: noise weighs twice in the loss | forward_model/ensemble.py | forward_model/test_ensemble.py
+training: noise weighs twice in the loss | forward_model/networks.py | forward_model/test_networks.py
     0.5 * (log_variance + ==> 0.5 * (2 * log_variance +
 training on held-out exemplars | forward_model/training.py | forward_model/test_forward_model.py
     torch.nonzero(~is_held)[:, 0] ==> torch.arange(len(x))
 training: weights after a divergence are kept | forward_model/training.py | forward_model/test_forward_model.py
-    self.ensemble.load_state_dict(weights) ==> weights.clear()
+    self.model.load_state_dict(weights) ==> weights.clear()
 board: counts in place of shares | board/curves.py | board/test_board.py
     {tag: n / total ==> {tag: n / 1
 board: a curve has its points one movement late | board/listener.py | board/test_board.py

@@ -34,6 +34,8 @@ def test_the_defaults_are_those_that_results_were_made_with(algorithm):
 def test_the_defaults_of_the_forward_model_are_those_that_results_were_made_with():
     learnt = Config(algorithm="sgim-d", parts={"inverse": "model"})
     model = {"inverse.members": 3, "inverse.noise_heads": True, "inverse.rate": 1.0, "inverse.trust": 0.25}
+    model |= {"inverse.widths": (64, 64), "inverse.activation": "silu", "inverse.batch": 128}
+    model |= {"inverse.lr": 0.01, "inverse.beta": 0.5, "inverse.network": "perceptrons"}
     assert model.items() <= learnt.values.items()
 
 

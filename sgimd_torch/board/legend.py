@@ -37,9 +37,13 @@ LEGEND: Final[Mapping[str, str]] = {
     "model/relative_error": "Prediction error for exemplars that training left out, divided by the error of predicting "
     "their mean outcome. A useless model has 1.",
     "model/held_out": "Negative log likelihood of exemplars that training left out; lower is better.",
+    "model/training_loss": "Negative log likelihood of as many exemplars that it was trained on.",
+    "model/gradient_norm": "Length of the gradient in the last step of the optimiser.",
+    "model/learning_rate": "Learning rate of the optimiser.",
     "model/steps": "Steps of the optimiser at the last refresh.",
     "model/error": "Mean distance UNIT from the newest outcomes to their predictions before training on them.",
     "model/coverage": "Share of the newest outcomes that lie in the 80 % regions of their predictions.",
+    "time/training_step": "Time (s) of a step of the optimiser, at the last refresh of the forward model.",
     "time": "Time (s) spent so far, by part of the run. Replayed movements have no times.",
     "map/competence": "Regions, named as in the curves, coloured by the mean competence of the goals they remember.",
     "map/error": "Benchmark goals, coloured by their error at this evaluation. The logarithmic scale depends on T "

@@ -37,7 +37,7 @@ MOVED: Final = 0.02  # rad, least way of a joint that moves
 STILL: Final = 1.0  # s after which an arm that was led and does not move has been led to the end
 GENTLY: Final = 0.5  # share of ``speed`` on the way back to rest
 KEPT: Final = 0.9  # least share of the commands of ``rate`` that are sent without a warning
-OF_MODEL: Final = ("joints", "low", "high", "rest", "durations", "n_knots", "keyframe")
+OF_MODEL: Final = ("joints", "low", "high", "rest", "durations", "n_knots", "servos", "keyframe", "posture")
 
 
 class LeRobotArm:
@@ -72,7 +72,7 @@ class LeRobotArm:
         ImportError: LeRobot is not installed.
     """
 
-    FOUND_OPTIONS: ClassVar = ("low", "high", "rest")
+    FOUND_OPTIONS: ClassVar = ("low", "high", "rest", "posture")
     at_once = 1
 
     @with_keywords_of(MujocoRobot, *OF_MODEL)

@@ -28,14 +28,26 @@ class GaussianPrimitive(Primitive):
             overlap alike. A factor below 5 makes the fit of eq. (6) ill-conditioned, a factor above 12 makes movements
             jerky.
         n_knots: number of knots of each joint, at least 2.
+        start: ``(n_joints,)`` posture in which every movement begins, a knot before those of theta; None: movements
+            begin near their first knot.
+        speeds, accelerations: ``(n_joints,)`` limits (rad/s and rad/s^2), inf for none; a movement that would exceed
+            them lasts longer.
 
     Raises:
-        ValueError: the durations do not satisfy 0 < shortest < longest, the sharpness is not above 0, or there are
-            fewer than 2 knots.
+        ValueError: the durations do not satisfy 0 < shortest < longest, the sharpness is not above 0, there are
+            fewer than 2 knots, or the start lies outside the ranges.
     """
 
     def __init__(
-        self, joints: Box, durations: tuple[float, float], *, sharpness: float = 9.0, n_knots: int = 4
+        self,
+        joints: Box,
+        durations: tuple[float, float],
+        *,
+        sharpness: float = 9.0,
+        n_knots: int = 4,
+        start: ArrayLike | None = None,
+        speeds: ArrayLike = np.inf,
+        accelerations: ArrayLike = np.inf,
     ) -> None:
         if not 0 < durations[0] < durations[1]:
             raise ValueError(f"durations must be 0 < shortest < longest in seconds, got {durations}")
@@ -44,14 +56,29 @@ class GaussianPrimitive(Primitive):
         self.joints = self.ranges = joints
         self.durations = durations
         self.n_knots = check_count("n_knots", n_knots, 2)
-        self.sharpness = sharpness * ((n_knots - 1) / 3) ** 2
         self.policies = Box.cube(0.0, 1.0, joints.dim * n_knots + 1)
-        self._centres = np.arange(n_knots) / (n_knots - 1)  # times of the knots, as shares of the duration
+        self.start = None if start is None else joints.check("start", start, "is it in the ranges?")
+        self.speeds, self.accelerations = (np.broadcast_to(limits, joints.dim) for limits in (speeds, accelerations))
+        n = n_knots + (start is not None)
+        self.sharpness = sharpness * ((n - 1) / 3) ** 2
+        self._centres = np.arange(n) / (n - 1)  # times of the knots, as shares of the duration
+        self._blend = np.eye(n)
+        if start is not None:
+            # Deviation: the first weight is scaled to be 1 at the start, and the others lose what they weigh then, so
+            # the trajectory begins in the start posture. Weights stay above 0 and sum to 1.
+            first = self._gaussians(np.zeros(1))[0]
+            self._blend[0] = [1 / first[0], *(-first[1:] / first[0])]
+        self._first, self._second = self._derivatives(np.linspace(0.0, 1.0, 101))
 
     def duration(self, theta: Array) -> float:
         """delta (s) of one ``(theta_dim,)`` theta."""
         shortest, longest = self.durations
-        return shortest + float(theta[-1]) * (longest - shortest)
+        wanted = shortest + float(theta[-1]) * (longest - shortest)
+        if not np.isfinite([self.speeds, self.accelerations]).any():
+            return wanted
+        knots = self._knots(theta).T
+        first, second = (np.abs(derivative @ knots).max(axis=0) for derivative in (self._first, self._second))
+        return float(max(wanted, (first / self.speeds).max(), np.sqrt(second / self.accelerations).max()))
 
     def at(self, theta: Array, times: Array) -> Array:
         """``(n_times, n_joints)`` joint angles (rad) at ``times`` (s); after delta the last posture is held."""
@@ -78,15 +105,14 @@ class GaussianPrimitive(Primitive):
 
         They occur at the shortest duration, with each knot at the end of its range that increases them.
         """
-        phases = np.linspace(0.0, 1.0, 1001)
-        weights = self._weights(phases)
-        slopes = -2 * self.sharpness * (phases[:, None] - self._centres)  # slopes of the logarithms of the weights
-        apart = slopes - (weights * slopes).sum(axis=1, keepdims=True)
-        first = weights * apart
-        second = weights * (apart**2 - (first * slopes).sum(axis=1, keepdims=True))
+        first, second = self._derivatives(np.linspace(0.0, 1.0, 1001))
         # The weights sum to 1, so their derivatives sum to 0: the positive ones sum to half of all absolute values.
         speed, acceleration = (np.abs(derivative).sum(axis=1).max() / 2 for derivative in (first, second))
-        return self.joints.sides * speed / self.durations[0], self.joints.sides * acceleration / self.durations[0] ** 2
+        speeds, accelerations = (self.joints.sides * most for most in (speed, acceleration))
+        return (
+            np.minimum(speeds / self.durations[0], self.speeds),
+            np.minimum(accelerations / self.durations[0] ** 2, self.accelerations),
+        )
 
     def correspondence(self, times: ArrayLike, trajectory: ArrayLike) -> Array:
         """theta_d, the policy that reproduces a demonstrated trajectory most closely; see `Translating`.
@@ -105,6 +131,8 @@ class GaussianPrimitive(Primitive):
         weights = self._weights((times - times[0]) / span)
         low, sides = self.joints.low, self.joints.sides
         scaled = (trajectory - low) / sides
+        if self.start is not None:  # a known knot
+            scaled, weights = scaled - weights[:, :1] * (self.start - low) / sides, weights[:, 1:]
         # If the knots of a joint lie in [0, 1], least squares without bounds is exact to rounding; lsq_linear is not.
         knots = np.linalg.lstsq(weights, scaled, rcond=None)[0]
         for joint in np.flatnonzero((np.abs(knots - 0.5) > 0.5 + 1e-9).any(axis=0)):
@@ -114,11 +142,27 @@ class GaussianPrimitive(Primitive):
         return self.policies.clip(np.append(knots.T.ravel(), pace))
 
     def _knots(self, theta: Array) -> Array:
+        """``(n_joints, n)`` rad, the knots, the start posture before those of theta."""
         knots = theta[:-1].reshape(self.joints.dim, self.n_knots)
-        return self.joints.low[:, None] + knots * self.joints.sides[:, None]
+        knots = self.joints.low[:, None] + knots * self.joints.sides[:, None]
+        return knots if self.start is None else np.column_stack([self.start, knots])
 
     def _weights(self, phases: Array) -> Array:
+        """``(n_phases, n)``, the weight of each knot."""
+        weights = self._gaussians(phases)
+        return weights if self.start is None else weights @ self._blend
+
+    def _gaussians(self, phases: Array) -> Array:
         # Deviation: the paper prints exp(+sigma |.|^2) and five terms; the sign and i = 0..3 are ours. With
         # sigma = s / delta^2 the weights depend only on the phase t / delta.
         weights = np.exp(-self.sharpness * (phases[:, None] - self._centres) ** 2)  # eq. (5)
         return weights / weights.sum(axis=1, keepdims=True)
+
+    def _derivatives(self, phases: Array) -> tuple[Array, Array]:
+        """``(n_phases, n)``, first and second derivatives of the weights by the phase."""
+        weights = self._gaussians(phases)
+        slopes = -2 * self.sharpness * (phases[:, None] - self._centres)  # slopes of the logarithms of the weights
+        apart = slopes - (weights * slopes).sum(axis=1, keepdims=True)
+        first = weights * apart
+        second = weights * (apart**2 - (first * slopes).sum(axis=1, keepdims=True))
+        return first @ self._blend, second @ self._blend

@@ -2,7 +2,7 @@
 
     robot = MujocoRobot("arm.xml", outcome="site:tip"); outcome = robot.execute(robot.observe(rng), theta, rng)
 A movement is open loop: all commands are known before it begins. So MuJoCo simulates many movements in parallel,
-outside Python. ``mujoco_model.py`` reads the model and finds what is named in it.
+outside Python. The folder ``models`` reads the file and finds what is named in it.
 """
 
 from __future__ import annotations
@@ -19,28 +19,30 @@ from mujoco import rollout
 from numpy.typing import ArrayLike
 
 from sgimd_torch.environments.controllers import Controller
-from sgimd_torch.environments.motor_primitives import GaussianPrimitive
-from sgimd_torch.environments.mujoco_model import (
+from sgimd_torch.environments.models.file import file_of, files_of, load_model
+from sgimd_torch.environments.models.look import NEARLY, SUNK, listed, missed, parts, reached
+from sgimd_torch.environments.models.places import (
     body_of,
+    check_moved,
     commands_box,
     context_box,
-    file_of,
-    files_of,
     hand_of,
     holding,
-    load_model,
     moved_by,
     outcome_places,
     path_to,
     positions,
+    pulled,
 )
+from sgimd_torch.environments.models.posture import touching
+from sgimd_torch.environments.motor_primitives import GaussianPrimitive
 from sgimd_torch.environments.protocol import Primitive, SimulationError, check_movement, check_robot
 from sgimd_torch.environments.sketch import Sketch
-from sgimd_torch.options.catalogue import unknown_name_error
 from sgimd_torch.spaces import Array, Box, check_count, check_point, check_rng, read_only, stream
 
 EXPLORED: Final = 300  # number of random movements that find T
 REPEATED: Final = 30  # number of random movements that are executed twice to find the noise of outcomes
+LOOKED: Final = 32  # number of random movements that the look before the first movement executes twice
 MOVED: Final = 1e-3  # m or rad, shift of the measured place that counts as moved
 FEWEST: Final = 10  # number of random movements that must move the measured place
 TREMBLE: Final = 1e-6  # m or rad; an object at rest trembles less, which must not look like an effect of a movement
@@ -81,11 +83,16 @@ class MujocoRobot:
         outcome_noise: standard deviation of outcomes if a movement is repeated; None for what ``noise`` makes of random
             movements, at least 1e-6.
         durations: shortest and longest duration of a movement (s).
-        n_knots: number of knots of each joint.
+        n_knots: number of knots of each joint, after the start.
         settle: time (s) between the end of a movement and its outcome.
         noise: standard deviation of the motor noise, relative to the range of each command. It shifts a command by a
             random amount throughout a movement.
-        keyframe: name of the keyframe in which each movement begins; "" for the model's initial positions.
+        servos: "auto" for position servos in place of motors, or if there are no actuators; "file" for the actuators of
+            the file; "made" for position servos at all joints with an actuator, and of an arm that a mocap body pulls.
+        keyframe: name of the keyframe in which each movement begins; "" for one named home or rest, or else the model's
+            initial positions.
+        posture: positions (rad or m) of all joints that turn or slide, in which each movement begins; () for those of
+            the keyframe, or the nearest within all ranges in which the robot does not touch itself.
         threads: number of threads of an evaluation; results do not depend on this number.
         controller: function (box of commands) -> controller, such as ``partial(Sinusoids, frequencies=(0.2, 2))``;
             None for a `GaussianPrimitive`.
@@ -93,7 +100,7 @@ class MujocoRobot:
     Attributes:
         bodies: indices of the bodies that the joints of the robot move.
         files: model file, and files that it includes.
-        found_options: T, ``rest`` and ``outcome_noise``, as options.
+        found_options: T, ``rest``, ``outcome_noise`` and ``posture``, as options.
         joints: names of the joints whose positions the commands are; () if they are anything else, such as torques.
         remarks: sentences for the user, for example about T.
 
@@ -102,7 +109,7 @@ class MujocoRobot:
         OSError: there is no such file.
     """
 
-    FOUND_OPTIONS: ClassVar = ("low", "high", "rest", "outcome_noise")
+    FOUND_OPTIONS: ClassVar = ("low", "high", "rest", "outcome_noise", "posture")
 
     def __init__(
         self,
@@ -120,7 +127,9 @@ class MujocoRobot:
         n_knots: int = 4,
         settle: float = 0.5,
         noise: float = 0.0,
+        servos: str = "auto",
         keyframe: str = "",
+        posture: tuple[float, ...] = (),
         threads: int = 1,
         controller: Callable[[Box], Controller] | None = None,
     ) -> None:
@@ -130,26 +139,35 @@ class MujocoRobot:
             if not 0 <= value < np.inf:
                 raise ValueError(f"{name} must be finite and >= 0, got {value}")
         path = file_of(model)
-        self.model, self.remarks = load_model(path, joints)
-        self.files = files_of(path)
+        loaded = load_model(path, joints, servos, keyframe, posture)
+        self.model, self.remarks, self.files = loaded.model, loaded.remarks, files_of(path)
         commands, self._actuators, said = commands_box(self.model, joints)
         self.remarks += said
-        make = controller or partial(GaussianPrimitive, durations=durations, n_knots=check_count("n_knots", n_knots, 2))
+        self.joints = positions(self.model, self._actuators)
+        self._home, self._held = self._begin(loaded.start)
+        make = controller or partial(
+            GaussianPrimitive,
+            durations=durations,
+            n_knots=check_count("n_knots", n_knots, 2),
+            start=commands.clip(self.start) if self.joints else None,
+            speeds=[loaded.speeds.get(name, np.inf) for name in self.joints] or np.inf,
+            accelerations=[loaded.accelerations.get(name, np.inf) for name in self.joints] or np.inf,
+        )
         self._controller = make(commands)
         self.primitive = self._controller if isinstance(self._controller, Primitive) else Primitive()
         if isinstance(self._controller, GaussianPrimitive):
             self.correspondence = self._controller.correspondence
         self.policies, self._sides = self._controller.policies, commands.sides
-        self.joints = positions(self.model, self._actuators)
         self.bodies = moved_by(self.model, self._actuators)
         self.contexts, self._addresses = context_box(self.model, context)
         self._places = outcome_places(self.model, outcome)
+        for place in self._places:
+            check_moved(self.model, place, self._actuators)
         self._hand = hand_of(self.model, self._places[0], self.bodies)
         self._longest, self._settle, self._displacement, self.noise = durations[1], settle, displacement, noise
         threads = check_count("threads", threads, 1)
         self._pool = rollout.Rollout(nthread=threads if threads > 1 else 0)
         self._data = [mujoco.MjData(self.model) for _ in range(threads)]
-        self._home, self._held = self._begin(keyframe, path.name)
         names = [name for place in self._places for name in place.names]
         self._dim = len(names)
         still = check_point("rest", rest, self._dim) if rest else self._still_outcome(path.name)
@@ -161,8 +179,10 @@ class MujocoRobot:
         self.rest = read_only(still if rest else self.outcomes.clip(np.round(still, 3)))
         self.outcome_noise = max(TREMBLE, self._scatter()) if outcome_noise is None else outcome_noise
         check_robot(self)
+        if not posture:  # a robot of a run that goes on was looked at before
+            self.remarks += self._look()
         points = [tuple(point.tolist()) for point in (self.outcomes.low, self.outcomes.high, self.rest)]
-        self.found_options = dict(zip(self.FOUND_OPTIONS, (*points, self.outcome_noise), strict=True))
+        self.found_options = dict(zip(self.FOUND_OPTIONS, (*points, self.outcome_noise, loaded.posture), strict=True))
 
     @property
     def start(self) -> Array:
@@ -277,14 +297,8 @@ class MujocoRobot:
         chains = np.stack(arm), *data.xpos[objects][:, None], *np.reshape(others, (-1, 1, 3))
         return [(chain - origin)[:, axes] for chain in chains]
 
-    def _begin(self, keyframe: str, file: str) -> tuple[Array, Array]:
-        """Start configuration (a full physics state), and commands ``(nu,)`` that hold it."""
-        data = self._data[0]
-        if keyframe:
-            names = [self.model.key(k).name for k in range(self.model.nkey)]
-            if keyframe not in names:
-                raise unknown_name_error(f"keyframe of {file}", keyframe, names)
-            mujoco.mj_resetDataKeyframe(self.model, data, names.index(keyframe))
+    def _begin(self, data: mujoco.MjData) -> tuple[Array, Array]:
+        """Start configuration (a full physics state) of ``data``, and commands ``(nu,)`` that hold it."""
         mujoco.mj_forward(self.model, data)
         held = holding(self.model, data)
         for k in np.flatnonzero(self.model.actuator_actadr >= 0):  # a filtered command has no delay at the start
@@ -350,6 +364,47 @@ class MujocoRobot:
             raise ValueError(f"{file} diverges even while it holds still; is its timestep too long?")
         return self._outcome(still)
 
+    def _look(self) -> list[str]:
+        """Sentences on what a user should know before the first movement."""
+        lines, middle = parts(self.model), (self.contexts.low + self.contexts.high) / 2
+        (still,) = self._simulate(middle[None], [self._still(self._longest)])
+        if still is not None:
+            sunk = float(np.linalg.norm(self._read(still[-1]) - self._read(still[0])))
+            mujoco.mj_forward(self.model, data := self._at(still[-1]))
+            names = [" and ".join(self.model.body(k).name for k in p) for p in touching(self.model, data, self.bodies)]
+            if names:
+                lines.append(f"holding still, the robot touches itself: {listed(names)}; give --environment.keyframe")
+            if sunk > SUNK:
+                advice = "" if self.joints else "; its commands are no positions: --environment.servos made holds it"
+                lines.append(f"holding still, what is measured moves by {self.outcomes.amount(sunk, '.2g')}{advice}")
+        contexts, thetas = self._drawn("look", LOOKED)
+        signs = [stream(0, "signs", k).choice([-1, 1], self.policies.dim) for k in range(LOOKED)]
+        sets = thetas, self.policies.clip(thetas + NEARLY * np.stack(signs))
+        commands = [[self._commands(t, stream(0, "looked at", k)) for k, t in enumerate(s)] for s in sets]
+        ones, others = (self._simulate(contexts, sequences) for sequences in commands)
+        right = [
+            k for k, pair in enumerate(zip(ones, others, strict=True)) if pair[0] is not None and pair[1] is not None
+        ]
+        if not right:
+            return [*lines, "every random movement diverges: write a shorter timestep into the model"]
+        if self.joints:
+            ends = np.stack([self.positions(states[-1]) for k in right if (states := ones[k]) is not None])
+            last = np.stack([commands[0][k][-1, self._actuators] for k in right])
+            lines += missed(self.model, [self.model.joint(name).id for name in self.joints], ends, last)
+        if isinstance(self._controller, GaussianPrimitive):
+            lasts = [self._controller.duration(theta) for theta in thetas]
+            if max(lasts) > self._longest:
+                lines.append(f"movements last {min(lasts):.2g} to {max(lasts):.2g} s, as no joint can move faster")
+        return lines + reached(
+            np.array([[self._outcome(ones[k]), self._outcome(others[k])] for k in right]), self.outcomes
+        )
+
+    def _drawn(self, name: str, n: int) -> tuple[Array, Array]:
+        """Contexts and thetas of ``n`` random movements."""
+        rngs = [stream(0, name, k) for k in range(n)]
+        contexts = np.stack([self.contexts.sample(rng) for rng in rngs])
+        return contexts, np.stack([self.policies.sample(rng) for rng in rngs])
+
     def _scatter(self) -> float:
         """Standard deviation of the outcomes of random movements, each executed twice."""
         if not self.noise:
@@ -363,9 +418,12 @@ class MujocoRobot:
         lost = int(np.isnan(ends).any(axis=1).sum())
         moved = ends[(np.abs(ends - starts) > MOVED).any(axis=1)]
         if len(moved) < FEWEST:
+            held = [self.model.body(body).name for _, body in pulled(self.model)]
+            nearer = f"free {held[0]} from its mocap body: --environment.servos made" if held else ""
+            nearer = nearer or "put the object nearer to the robot"
             raise ValueError(
                 f"{len(moved)} of {EXPLORED} random movements of {file} move {', '.join(names)}, {lost} diverge; give "
-                "low and high, which are the corners of T, or put the object nearer to the robot"
+                f"low and high, which are the corners of T, or {nearer}"
             )
         low, high = np.quantile(moved, (0.05, 0.95), axis=0)  # an object that flies away does not set the size of T
         low, high = np.minimum(low, rest) - 0.1 * (high - low), np.maximum(high, rest) + 0.1 * (high - low)
@@ -384,9 +442,7 @@ class MujocoRobot:
 
     def _tried(self, n: int, execution: str) -> tuple[Array, Array]:
         """Measured places at the start, and outcomes, of ``n`` random movements; the noise depends on ``execution``."""
-        rngs = [stream(0, "random movements", k) for k in range(n)]
-        contexts = np.stack([self.contexts.sample(rng) for rng in rngs])
-        thetas = np.stack([self.policies.sample(rng) for rng in rngs])
+        contexts, thetas = self._drawn("random movements", n)
         ends = self.execute_many(contexts, thetas, [stream(0, execution, k) for k in range(n)])
         starts = (
             np.zeros_like(ends) if self._displacement else np.stack([self._read(self.start_in(c)) for c in contexts])

@@ -44,6 +44,7 @@ class ModelInverse(ModelBased):
 
     def __call__(self, context: Array, goal: Array) -> Estimate:
         """The theta with the least expected distance, and the exemplars of the estimate of `LocallyLinear`."""
+        self.model.guides |= self.trusted
         return self.answer_many(context[None], goal[None])[0]
 
     def answer_many(self, contexts: Array, goals: Array) -> list[Estimate]:

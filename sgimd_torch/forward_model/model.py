@@ -1,6 +1,7 @@
 """Forward model L, which predicts the outcome of a movement: an ensemble of networks, trained while the robot learns.
 
-Not in Nguyen & Oudeyer (2014), who use local models only. `OnlineTrainer` trains the networks.
+Not in Nguyen & Oudeyer (2014), who use local models only. `OnlineTrainer` trains the networks. `ForwardModel` is a
+LightningModule, which any loop of Lightning can train and ``load_from_checkpoint`` can load.
     model = ForwardModel(0, 25, 2, seed=3); model.refresh(memory); model.predict(contexts, thetas).mean
 """
 
@@ -8,14 +9,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import torch
+from lightning import LightningModule
 
-from sgimd_torch.forward_model.ensemble import Ensemble
+from sgimd_torch.forward_model.networks import (
+    ACTIVATION,
+    LOG_VARIANCES,
+    WIDTHS,
+    OwnNetworks,
+    Perceptrons,
+    Scales,
+    described,
+    nll,
+)
 from sgimd_torch.forward_model.training import Fit, OnlineTrainer, one_thread
 from sgimd_torch.memory import Memory
+from sgimd_torch.options.catalogue import function_of
 from sgimd_torch.spaces import Array, check_count, check_vector, stream
 
 TRUSTED_UP_TO: Final = 0.25  # largest relative error of a model that is used
@@ -51,7 +63,7 @@ class Refresh(NamedTuple):
     predicted: Prediction | None
 
 
-class ForwardModel(Ensemble):
+class ForwardModel(LightningModule):
     """Prediction of the outcome of theta in a context, with its spread; ``landing`` is differentiable in theta.
 
     Args:
@@ -61,6 +73,13 @@ class ForwardModel(Ensemble):
         seed: number from which weights and batches come; torch's global generator is not used.
         members: number of networks; where they disagree, more exemplars would improve the prediction.
         every: number of new exemplars between two refreshes.
+        network: constructor of a network, which may be your own, see `Network`; its own keywords are its options.
+        widths: number of units of each hidden layer of a perceptron.
+        activation: activation function of a perceptron: silu, relu, gelu or tanh.
+        lr: learning rate of Adam.
+        beta: exponent in [0, 1]; the loss of an exemplar is its negative log likelihood times (noise variance)^beta.
+            With 0 noisy exemplars hardly count; with .5 they are learnt, too (Seitzer et al., ICLR 2022).
+        batch: number of exemplars in a step, for each member.
         rate: number of steps of the optimiser for each new exemplar; .3 steps take a fifth of the time of a movement of
             the fishing rod, 2 steps take as long as such a movement.
         noise_heads: true: the predicted noise depends on the movement; false: all movements have the same noise.
@@ -70,9 +89,11 @@ class ForwardModel(Ensemble):
     Attributes:
         before_learning: functions that test the model on new exemplars. Each refresh calls them first, with the memory
             and the number of exemplars that the model has learnt from.
+        guides: whether movements of the learner have depended on the model; then their replay has to train it.
+        awaited: checkpoint to load, instead of training, once the memory has the exemplars that it has learnt from.
 
     Raises:
-        ValueError: a number is out of its range, or this machine has no such device.
+        ValueError: a number is out of its range, a network is refused, or this machine has no such device.
     """
 
     input_mean: torch.Tensor  # (context_dim + theta_dim,)
@@ -92,22 +113,44 @@ class ForwardModel(Ensemble):
         seed: int = 0,
         members: int = 3,
         every: int = 50,
+        network: Callable[..., Any] = Perceptrons,
+        widths: tuple[int, ...] = WIDTHS,
+        activation: str = ACTIVATION,
+        lr: float = 1e-2,
+        beta: float = 0.5,
+        batch: int = 128,
         rate: float = 1.0,
         noise_heads: bool = True,
         accelerator: str = "auto",
         trust: float = TRUSTED_UP_TO,
     ) -> None:
-        sizes = {"context_dim": context_dim, "theta_dim": theta_dim, "outcome_dim": outcome_dim}
-        for name, count in {**sizes, "members": members, "every": every}.items():
+        super().__init__()
+        self.save_hyperparameters(ignore=["network", "accelerator"])  # a device is chosen when a model is loaded
+        dims = context_dim, theta_dim, outcome_dim
+        self.sizes = dict(zip(("context_dim", "theta_dim", "outcome_dim"), dims, strict=True))
+        for name, count in {**self.sizes, "members": members, "every": every, "batch": batch}.items():
             check_count(name, count, 0 if name == "context_dim" else 1)
-        for name, value in {"rate": rate, "trust": trust}.items():
+        for name, value in {"rate": rate, "trust": trust, "lr": lr}.items():
             if not 0 < value < math.inf:
                 raise ValueError(f"{name} must be positive and finite, got {value}")
-        generator = torch.Generator().manual_seed(int(stream(seed, "forward model").integers(2**63)))
-        super().__init__(context_dim + theta_dim, outcome_dim, generator, members, noise_heads)
-        self.sizes, self.every, self.rate, self.trust = sizes, every, rate, trust
+        if not 0 <= beta <= 1:
+            raise ValueError(f"beta must lie in [0, 1], got {beta}")
+        self.members, self.every, self.rate, self.trust, self.lr, self.beta = members, every, rate, trust, lr, beta
         self.before_learning: list[Callable[[Memory, int], object]] = []
-        self._online = OnlineTrainer(self, generator, every, accelerator)
+        self.guides, self.awaited = False, dict[str, Any]()
+        generator = torch.Generator().manual_seed(int(stream(seed, "forward model").integers(2**63)))
+        self.networks: Perceptrons | OwnNetworks
+        if isinstance(network, str):  # of a checkpoint, which names its network but does not hold its code
+            raise ValueError(f"this checkpoint has {network}: load_from_checkpoint(path, network=...)")
+        if function_of(network) is Perceptrons:
+            inputs = context_dim + theta_dim
+            self.networks = Perceptrons(inputs, outcome_dim, members, generator, widths, activation, noise_heads)
+        elif (widths, activation) != (WIDTHS, ACTIVATION):
+            raise ValueError(f"widths and activation are options of perceptrons, not of {described(network)}")
+        else:
+            self.networks = OwnNetworks(network, dims, members, generator, noise_heads)
+            self.hparams["network"] = described(network)
+        self._online = OnlineTrainer(self, generator, members, every, batch, accelerator)
         for name, dim in {"input": context_dim + theta_dim, "outcome": outcome_dim}.items():
             self.register_buffer(f"{name}_mean", torch.zeros(dim))
             self.register_buffer(f"{name}_scale", torch.ones(dim))
@@ -137,6 +180,37 @@ class ForwardModel(Ensemble):
         """Whether the relative error is small enough to use the model."""
         return self.relative_error <= self.trust
 
+    def forward(self, inputs: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """Mean and log variance ``(members, n, outcome_dim)`` for ``(n, n_inputs)``, or ``(members, n, n_inputs)``; all
+        are standardised."""
+        mean, log_variance = self.networks(inputs.expand(self.members, *inputs.shape[-2:]), self._scales)
+        return mean, log_variance.clamp(*LOG_VARIANCES)
+
+    def training_step(self, batch: tuple[torch.Tensor, torch.Tensor], batch_idx: int = 0) -> torch.Tensor:
+        """Loss for `standardised` inputs and outcomes, ``(members, n, ...)`` or ``(n, ...)`` each: negative log
+        likelihood, weighted by ``beta``."""
+        inputs, outcomes = batch
+        mean, log_variance = self(inputs)
+        return (nll(mean, log_variance, outcomes) * (self.beta * log_variance).exp().detach()).mean()
+
+    def configure_optimizers(self) -> torch.optim.Optimizer:
+        """Adam, in the fused implementation."""
+        return torch.optim.Adam(self.parameters(), lr=self.lr, fused=True)
+
+    def on_save_checkpoint(self, checkpoint: dict[str, Any]) -> None:
+        """Lightning's hook: add what the next refresh needs besides the weights."""
+        checkpoint["online"] = self._online.state
+
+    def on_load_checkpoint(self, checkpoint: dict[str, Any]) -> None:
+        """Lightning's hook: the next refresh goes on as if the model had not been saved."""
+        self._online.state = checkpoint["online"]
+
+    def standardised(self, memory: Memory) -> tuple[torch.Tensor, torch.Tensor]:
+        """Inputs ``(n, context_dim + theta_dim)`` and outcomes ``(n, outcome_dim)`` to train on."""
+        inputs = self.tensor(np.hstack([memory.contexts, memory.thetas]))
+        outcomes = self.tensor(memory.outcomes)
+        return (inputs - self.input_mean) / self.input_scale, (outcomes - self.outcome_mean) / self.outcome_scale
+
     def landing(self, context: torch.Tensor, theta: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         """Mean and noise variance of outcomes by each member, ``(members, ..., outcome_dim)`` each; differentiable.
 
@@ -144,6 +218,8 @@ class ForwardModel(Ensemble):
             context: ``(..., context_dim)``, or one context for all thetas.
             theta: ``(..., theta_dim)``.
         """
+        if self.training:
+            self.eval()
         inputs = torch.cat([context.expand(*theta.shape[:-1], context.shape[-1]), theta], dim=-1)
         mean, log_variance = self(((inputs - self.input_mean) / self.input_scale).reshape(-1, inputs.shape[-1]))
         shape = (self.members, *theta.shape[:-1], mean.shape[-1])
@@ -176,6 +252,8 @@ class ForwardModel(Ensemble):
         """Learn from new and old exemplars in ``memory``; None if fewer than ``every`` exemplars are new, or all
         outcomes are equal.
 
+        With an ``awaited`` checkpoint: load it if its moment has come, and return None.
+
         Training ends early when predictions for the held-out exemplars (one in ten, never trained on) stop improving.
         The earlier weights are restored if the loss is not finite, if the relative error exceeds both 2 and twice
         its earlier value, or if training is interrupted.
@@ -186,6 +264,12 @@ class ForwardModel(Ensemble):
         Raises:
             ValueError: the memory has other dimensions, or fewer exemplars than the model was trained on.
         """
+        if self.awaited:
+            if len(memory) == int(self.awaited["state_dict"]["n_seen"]):
+                self.load_state_dict(self.awaited["state_dict"])
+                self.on_load_checkpoint(self.awaited)
+                self.awaited = {}
+            return None
         sizes = {name: getattr(memory, name) for name in self.sizes}
         if sizes != self.sizes:
             raise ValueError(f"the model has dimensions {self.sizes}, the memory {sizes}; is it another robot's?")
@@ -199,15 +283,11 @@ class ForwardModel(Ensemble):
         for test in self.before_learning if seen else ():
             test(memory, seen)
         self._online.prepare()  # weights must be on the device before the exemplars
-        inputs, outcomes = np.hstack([memory.contexts, memory.thetas]), memory.outcomes
         predicted = self.predict(memory.contexts[seen:], memory.thetas[seen:]) if seen else None
         if n > 2 * int(self.n_scaled):
-            self._scale(inputs, outcomes)
-        x = (self.tensor(inputs) - self.input_mean) / self.input_scale
-        y = (self.tensor(outcomes) - self.outcome_mean) / self.outcome_scale
+            self._scale(np.hstack([memory.contexts, memory.thetas]), memory.outcomes)
         fit = self._online.fit(
-            x,
-            y,
+            *self.standardised(memory),
             self.outcome_scale,
             steps=max(1, round(self.rate * (n - seen))),
             give_up=max(_DIVERGED_ABOVE, 2 * self.relative_error),
@@ -216,23 +296,19 @@ class ForwardModel(Ensemble):
         self.n_seen.fill_(n)
         return Refresh(fit, seen, predicted)
 
+    @property
+    def _scales(self) -> Scales:
+        return Scales(self.input_mean, self.input_scale, self.outcome_mean, self.outcome_scale)
+
     def _scale(self, inputs: Array, outcomes: Array) -> None:
-        """Standardise inputs and outcomes anew. Predicted means do not change; predicted noise keeps its ratio to the
-        spread of outcomes."""
-        n = len(inputs)
-        (mean, scale), (new_mean, new_scale) = (self.input_mean, self.input_scale), self._spread(inputs)
-        first, last = self.weights[0].data, self.weights[-1].data
+        """Standardise inputs and outcomes anew. Means that perceptrons predict do not change; predicted noise keeps its
+        ratio to the spread of outcomes."""
+        new = Scales(*(part for values in (inputs, outcomes) for part in self._spread(values)))
         if int(self.n_scaled):
-            self.biases[0].data += (((new_mean - mean) / scale) @ first)[:, None]
-            first *= (new_scale / scale)[:, None]
-        self.input_mean.copy_(new_mean), self.input_scale.copy_(new_scale)
-        (mean, scale), (new_mean, new_scale) = (self.outcome_mean, self.outcome_scale), self._spread(outcomes)
-        if int(self.n_scaled):
-            ratio, dim = scale / new_scale, len(mean)
-            last[..., :dim] *= ratio
-            self.biases[-1].data[..., :dim] = self.biases[-1].data[..., :dim] * ratio + (mean - new_mean) / new_scale
-        self.outcome_mean.copy_(new_mean), self.outcome_scale.copy_(new_scale)
-        self.n_scaled.fill_(n)
+            self.networks.rescale(self._scales, new)
+        for old, value in zip(self._scales, new, strict=True):
+            old.copy_(value)
+        self.n_scaled.fill_(len(inputs))
 
     def _spread(self, values: Array) -> tuple[torch.Tensor, torch.Tensor]:
         spread = values.std(axis=0)

@@ -52,6 +52,7 @@ class ProvedModel(ModelBased):
         self._tests: list[tuple[int, float, float, float]] = []
         self._proved = False
         self.model.before_learning.append(self._test)
+        self.model.guides = True
 
     @property
     def trusted(self) -> bool:

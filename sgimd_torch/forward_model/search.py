@@ -55,7 +55,7 @@ class GradientSearch(Search):
         if not uses_model(self.problem.inverse, self.model):
             yield from self._simplex(start, goal)
             return
-        policies = self.problem.policies
+        self.model.guides, policies = True, self.problem.policies
         first = policies.check("theta of the estimate", start.theta)[None]
         radius, thetas, outcomes = _RADIUS, start.thetas, start.outcomes
         while True:

@@ -1,23 +1,27 @@
 """One forward model for all parts of a learner, and its place in a run: training, records of its predictions, messages.
 
     model = model_of(problem, members=5); model_of(problem) is model
-A replay writes the tables of the record again, so the tables of a resumed run are complete.
+A replay writes the tables of the record again, except rows that come before a checkpoint which it loads.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from itertools import islice
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from scipy.special import gammaincinv
 
-from sgimd_torch.forward_model.model import ForwardModel, Prediction, Refresh
+from sgimd_torch.evaluation import Evaluation
+from sgimd_torch.forward_model.checkpoints import Checkpoints
+from sgimd_torch.forward_model.model import ForwardModel, Refresh
 from sgimd_torch.memory import Memory
 from sgimd_torch.options.signature import with_keywords_of
 from sgimd_torch.parts import Inverse, Problem, Trained
-from sgimd_torch.record import Record
+from sgimd_torch.record import Record, Row, RunError
 from sgimd_torch.runs.run import Listener, RunLoop, Seconds
 from sgimd_torch.runs.signals import say
 from sgimd_torch.spaces import Array, Episode
@@ -44,12 +48,23 @@ class SharedModel(Trained):
 
     def listener(self, loop: RunLoop) -> ModelListener:
         """Listener that refreshes the model in a run."""
-        learner = loop.parts.learner
+        learner, config = loop.parts.learner, loop.parts.config
         asked = partial(uses_model, learner.inverse, self.model)
-        return ModelListener(loop.record, self.model, asked, learner.memory, loop.seconds)
+        checkpoints = Checkpoints(config.directory, at_evaluations=config.checkpoints)
+        return ModelListener(loop.record, self.model, asked, learner.memory, loop.seconds, checkpoints)
+
+    def restore(self, directory: Path, refreshes: Sequence[Row], span: tuple[float, float]) -> None:
+        """Let a replay load the last usable checkpoint of the run in ``directory`` instead of training."""
+        try:
+            self.model.awaited = Checkpoints(directory).newest(self.model, refreshes, span)
+        except RunError as error:
+            say(f"{error}; the forward model is trained again")
 
 
-@with_keywords_of(ForwardModel, "members", "rate", "noise_heads", "accelerator", "trust")
+_OPTIONS: Final = ("members", "network", "widths", "activation", "lr", "beta", "batch", "rate", "noise_heads")
+
+
+@with_keywords_of(ForwardModel, *_OPTIONS, "accelerator", "trust")
 def model_of(problem: Problem, **options: Any) -> ForwardModel:
     """The forward model of a problem; the first call makes it, with these options."""
     return problem.shared(SharedModel, partial(SharedModel, problem, **options)).model
@@ -81,7 +96,7 @@ def uses_model(inverse: Inverse, model: ForwardModel) -> bool:
 
 
 class ModelListener(Listener):
-    """Refreshes the model after every movement and records its predictions.
+    """Refreshes the model after every movement, records its predictions and writes its checkpoints.
 
     Args:
         record: record of the run.
@@ -89,29 +104,52 @@ class ModelListener(Listener):
         asked: function that returns whether the learner uses the model now.
         memory: memory of the learner.
         seconds: clock of the run; it includes the training during a replay.
+        checkpoints: checkpoints of the run.
     """
 
     def __init__(
-        self, record: Record, model: ForwardModel, asked: Callable[[], bool], memory: Memory, seconds: Seconds
+        self,
+        record: Record,
+        model: ForwardModel,
+        asked: Callable[[], bool],
+        memory: Memory,
+        seconds: Seconds,
+        checkpoints: Checkpoints,
     ) -> None:
         self._record, self._model, self._memory, self._seconds = record, model, memory, seconds
-        self._uses_model, self._asked = asked, False
+        self._uses_model, self._asked, self._checkpoints = asked, False, checkpoints
         self._curves: dict[str, float] = {}
+        self._refresh: Row = ()  # row of the last refresh
+        self._written: Row = ()  # row of the refresh in the last checkpoint
+        self._evaluated: tuple[int, Row] = 0, ()
+        # Rows that the replay does not compute again, because it loads an awaited checkpoint.
+        movements, exemplars, *_ = model.awaited.get("refresh", (0, 0))
+        refreshes = [row for row in record.rows("refreshes") if row[0] <= movements]
+        predictions = [row for row in record.rows("predictions") if row[0] < exemplars]
+        record.replace_rows("refreshes", refreshes)
+        record.replace_rows("predictions", predictions)
+        self._kept, self._kept_predictions = {row[0]: row for row in refreshes}, iter(predictions)
 
     def episode(self, episode: Episode, replayed: bool) -> None:
         """Refresh the model after a movement; print a message if its use begins or ends, or its training diverges."""
         memory, movements = self._memory, episode.index + 1
         with self._seconds.of("model"):
             refresh = self._model.refresh(memory)
+        if kept := self._kept.get(movements):
+            n_new = kept[1] - self._refresh[1] if self._refresh else 0
+            self._told(kept, np.array([cells for _, *cells in islice(self._kept_predictions, n_new)]))
+            self._asked = self._uses_model()
         if refresh is None:
             return
-        error = self._model.relative_error
-        fit = refresh.fit
-        row = movements, len(memory), fit.steps, fit.loss, error, int(fit.diverged)
+        error, fit, predicted = self._model.relative_error, refresh.fit, np.empty((0, 0))
+        learnt = fit.loss, error, int(fit.diverged), fit.training_loss, fit.gradient_norm, fit.lr
+        row = movements, len(memory), fit.steps, *learnt
         self._record.add_rows("refreshes", [row])
-        self._curves = {"model/relative_error": error, "model/held_out": fit.loss, "model/steps": fit.steps}
         if refresh.predicted is not None:
-            self._predicted(refresh.first, memory.outcomes[refresh.first :], refresh.predicted)
+            predicted = np.hstack((memory.outcomes[refresh.first :], *refresh.predicted))
+            rows = ((exemplar, *columns) for exemplar, columns in enumerate(predicted.tolist(), refresh.first))
+            self._record.add_rows("predictions", rows)
+        self._told(row, predicted)
         news = ["training diverged; the forward model keeps its last good weights"] if fit.diverged else []
         asked = self._uses_model()
         if asked != self._asked:
@@ -119,7 +157,23 @@ class ModelListener(Listener):
             who = "the forward model is used from here on" if asked else NOT_USED
             news.append(f"{who}: {self._how_wrong(error)}")
         if not replayed:
+            self._curves["time/training_step"] = fit.seconds
             say(*(f"movement {movements}: {message}" for message in news))
+
+    def evaluated(self, movements: int, evaluations: Mapping[str, Evaluation]) -> None:
+        """Remember the moment for a checkpoint."""
+        self._evaluated = movements, self._refresh
+
+    def flush(self) -> None:
+        """Write checkpoints of the last refresh, which the record has by now."""
+        if self._refresh != self._written:
+            self._checkpoints.write("last", self._model, self._refresh)
+            self._written = self._refresh
+        movements, refresh = self._evaluated
+        if refresh and refresh == self._refresh:
+            self._evaluated = 0, ()
+            if self._checkpoints.at_evaluations:
+                self._checkpoints.write(f"{movements:06d}", self._model, refresh)
 
     def close(self) -> None:
         """Print a message if the model is not used."""
@@ -133,12 +187,16 @@ class ModelListener(Listener):
         curves, self._curves = self._curves, {}
         return curves
 
-    def _predicted(self, first: int, outcomes: Array, predicted: Prediction) -> None:
-        values = np.hstack((outcomes, *predicted)).tolist()
-        self._record.add_rows("predictions", ((row, *columns) for row, columns in enumerate(values, first)))
-        spread = np.hypot(predicted.epistemic, predicted.aleatoric)
-        self._curves["model/error"] = float(np.linalg.norm(outcomes - predicted.mean, axis=1).mean())
-        self._curves["model/coverage"] = coverage(outcomes, predicted.mean, spread, LEVEL)
+    def _told(self, row: Row, predicted: Array) -> None:
+        """Remember a refresh: its ``row``, and ``predicted``, rows of the record without the number of the exemplar."""
+        self._refresh = row
+        _, _, steps, held_out, error, _, training, norm, lr = row
+        self._curves = {"model/relative_error": error, "model/held_out": held_out, "model/training_loss": training}
+        self._curves |= {"model/steps": steps, "model/gradient_norm": norm, "model/learning_rate": lr}
+        if predicted.size:
+            outcomes, mean, epistemic, aleatoric = np.hsplit(predicted, 4)
+            self._curves["model/error"] = float(np.linalg.norm(outcomes - mean, axis=1).mean())
+            self._curves["model/coverage"] = coverage(outcomes, mean, np.hypot(epistemic, aleatoric), LEVEL)
 
     def _how_wrong(self, error: float) -> str:
         unproved = not self._asked and self._model.trusted

@@ -1,4 +1,4 @@
-"""Online training: repeated fits of an ensemble to a growing set of exemplars; a fit that diverges is undone.
+"""Online training: repeated fits of networks to a growing set of exemplars; a fit that diverges is undone.
 
 The training uses Lightning Fabric, with one optimiser for all fits, so that Adam's moments last from fit to fit.
     trainer.prepare(); fit = trainer.fit(x, y, scale, steps=15, give_up=2.0)
@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator
+import time
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, Final, NamedTuple
@@ -18,11 +19,10 @@ from lightning import Fabric
 from lightning.fabric.accelerators import ACCELERATOR_REGISTRY
 from lightning.fabric.plugins.environments.lightning import LightningEnvironment
 
-from sgimd_torch.forward_model.ensemble import Ensemble, nll
+from sgimd_torch.forward_model.networks import nll
 from sgimd_torch.options.catalogue import did_you_mean
 
 _RECENT: Final = 0.25  # share of every batch that is drawn from the newest exemplars
-_BATCH: Final = 128  # number of exemplars in a step, for each member
 _HELD_OUT_EVERY: Final = 10  # every tenth exemplar is held out, that is, never trained on
 _STEPS_PER_TEST: Final = 20  # number of optimiser steps between two tests on the held-out exemplars
 _PATIENCE: Final = 5  # number of tests without improvement after which a fit ends
@@ -36,34 +36,47 @@ class Fit(NamedTuple):
         loss: negative log likelihood of the held-out exemplars, in standardised outcomes; lower is better.
         relative_error: error of predictions for the held-out exemplars, see `ForwardModel.relative_error`.
         diverged: true if the fit diverged and the earlier weights were restored.
+        training_loss: negative log likelihood of as many exemplars that were trained on.
+        gradient_norm: length of the gradient in the last step.
+        lr: learning rate of the last step.
+        seconds: mean duration of a step.
     """
 
     steps: int
     loss: float
     relative_error: float
     diverged: bool
+    training_loss: float
+    gradient_norm: float
+    lr: float
+    seconds: float
 
 
 @dataclass(eq=False)
 class OnlineTrainer:
-    """Fits one ensemble many times.
+    """Fits the networks of one model many times.
 
     Args:
-        ensemble: networks, whose weights change.
+        model: LightningModule, whose weights change.
         generator: random stream of the batches; each member has batches of its own.
+        members: number of networks of the model.
         newest: number of last exemplars that count as the newest.
+        batch: number of exemplars in a step, for each member.
         accelerator: Lightning's name of the device that trains, or auto for the CPU.
 
     Raises:
         ValueError: this machine has no such device.
     """
 
-    ensemble: Ensemble
+    model: Any
     generator: torch.Generator
+    members: int
     newest: int
+    batch: int
     accelerator: str
     fabric: Fabric | None = field(init=False)
     optimizer: Any = None
+    moments: Any = None  # of an optimiser that is still to be made
 
     def __post_init__(self) -> None:
         self.fabric = fabric_on(self.accelerator)  # refuses a missing device before the first movement
@@ -73,9 +86,23 @@ class OnlineTrainer:
         if self.fabric is None:
             self.fabric = fabric_on(self.accelerator)
         if self.optimizer is None:
-            self.ensemble.to(self.fabric.device)
-            self.optimizer = self.fabric.setup_optimizers(self.ensemble.configure_optimizers())
+            self.model.to(self.fabric.device)
+            self.optimizer = self.fabric.setup_optimizers(self.model.configure_optimizers())
+            if self.moments is not None:
+                self.optimizer.load_state_dict(self.moments)
+                self.moments = None
         return self.fabric
+
+    @property
+    def state(self) -> dict[str, Any]:
+        """What a checkpoint needs besides the weights, so that training goes on as if it had not stopped."""
+        moments = self.moments if self.optimizer is None else self.optimizer.state_dict()
+        return {"generator": self.generator.get_state(), "moments": moments}
+
+    @state.setter
+    def state(self, state: Mapping[str, Any]) -> None:
+        self.generator.set_state(state["generator"].cpu())
+        self.optimizer, self.moments = None, state["moments"]
 
     def fit(self, x: torch.Tensor, y: torch.Tensor, scale: torch.Tensor, *, steps: int, give_up: float) -> Fit:
         """Train until predictions for the held-out exemplars, one in ten, stop improving.
@@ -83,7 +110,7 @@ class OnlineTrainer:
         The weights before the fit are restored if it diverges or is interrupted.
 
         Args:
-            x: ``(n, n_inputs)`` standardised inputs, the newest last, on the device of the ensemble.
+            x: ``(n, n_inputs)`` standardised inputs, the newest last, on the device of the model.
             y: ``(n, n_outputs)`` standardised outputs.
             scale: ``(n_outputs,)`` factors that turn outputs into the unit of outcomes.
             steps: largest number of steps of the optimiser, at least 1.
@@ -93,51 +120,65 @@ class OnlineTrainer:
         fabric = self.prepare()
         is_held = torch.arange(len(x)) % _HELD_OUT_EVERY == _HELD_OUT_EVERY - 1
         rows = torch.nonzero(~is_held)[:, 0]
-        before = {name: values.clone() for name, values in self.ensemble.state_dict().items()}
-        best_loss, n_waited, n_done = math.inf, 0, 0
+        before = {name: values.clone() for name, values in self.model.state_dict().items()}
+        best_loss, n_waited, n_done, diverged, seconds = math.inf, 0, 0, False, 0.0
         try:
-            while n_done < steps and n_waited < _PATIENCE:
-                n_steps = min(_STEPS_PER_TEST, steps - n_done)
-                for _ in range(n_steps):
-                    drawn = self._draw(rows)
-                    self.optimizer.zero_grad()
-                    fabric.backward(self.ensemble.training_step((x[drawn], y[drawn])))
-                    self.optimizer.step()
-                n_done += n_steps
+            while n_done < steps and n_waited < _PATIENCE and not diverged:
+                n_steps, begun = min(_STEPS_PER_TEST, steps - n_done), time.perf_counter()
+                with self._own_randomness(len(x) + n_done):
+                    for _ in range(n_steps):
+                        drawn = self._draw(rows)
+                        self.optimizer.zero_grad()
+                        fabric.backward(self.model.training_step((x[drawn], y[drawn])))
+                        self.optimizer.step()
+                n_done, seconds = n_done + n_steps, seconds + time.perf_counter() - begun
                 loss, error = self.score(x[is_held], y[is_held], scale)
-                if not (math.isfinite(loss) and error <= give_up):
-                    self._restore(before)
-                    return Fit(n_done, *self.score(x[is_held], y[is_held], scale), diverged=True)
+                diverged = not (math.isfinite(loss) and error <= give_up)
                 best_loss, n_waited = (loss, 0) if loss < best_loss else (best_loss, n_waited + 1)
+            gradients = [weights.grad for weights in self.model.parameters() if weights.grad is not None]
+            norm, lr = float(torch.nn.utils.get_total_norm(gradients)), self.optimizer.param_groups[0]["lr"]
+            if diverged:
+                self._restore(before)
+                loss, error = self.score(x[is_held], y[is_held], scale)
+            trained, _ = self.score(x[rows[:: _HELD_OUT_EVERY - 1]], y[rows[:: _HELD_OUT_EVERY - 1]], scale)
         except BaseException:
             self._restore(before)
             raise
-        return Fit(n_done, loss, error, diverged=False)
+        return Fit(n_done, loss, error, diverged, trained, norm, lr, seconds / n_done)
 
     def score(self, x: torch.Tensor, y: torch.Tensor, scale: torch.Tensor) -> tuple[float, float]:
         """Two numbers: the mean negative log likelihood of the members; and the error of their mean prediction, divided
         by the error of always predicting the mean of ``y``."""
+        self.model.eval()
         with torch.no_grad():
-            mean, log_variance = self.ensemble(x)
+            mean, log_variance = self.model(x)
             lengths = scale * torch.stack([mean.mean(dim=0) - y, y.mean(dim=0) - y])
             error = torch.div(*lengths.norm(dim=-1).mean(dim=-1).clamp(min=torch.finfo().tiny))
             return float(nll(mean, log_variance, y).mean()), float(error)
 
     def __getstate__(self) -> dict[str, Any]:
         """State for copies and other processes, without the optimiser."""
-        return {**self.__dict__, "fabric": None, "optimizer": None}
+        return {**self.__dict__, "fabric": None, "optimizer": None, "moments": None}
 
     def _draw(self, rows: torch.Tensor) -> torch.Tensor:
         """Random rows ``(members, batch)``; the first quarter of each batch is drawn from the newest exemplars."""
-        members, recent, n_recent = self.ensemble.members, rows[-self.newest :], round(_RECENT * _BATCH)
-        drawn = rows[torch.randint(len(rows), (members, _BATCH), generator=self.generator)]
-        drawn[:, :n_recent] = recent[torch.randint(len(recent), (members, n_recent), generator=self.generator)]
+        recent, n_recent = rows[-self.newest :], round(_RECENT * self.batch)
+        drawn = rows[torch.randint(len(rows), (self.members, self.batch), generator=self.generator)]
+        drawn[:, :n_recent] = recent[torch.randint(len(recent), (self.members, n_recent), generator=self.generator)]
         return drawn
+
+    @contextmanager
+    def _own_randomness(self, number: int) -> Iterator[None]:
+        """Training mode, and a random stream with this ``number`` for layers that draw, such as dropout."""
+        with torch.random.fork_rng(devices=[]):
+            torch.default_generator.manual_seed(self.generator.initial_seed() + number)
+            self.model.train()
+            yield
 
     def _restore(self, weights: dict[str, torch.Tensor]) -> None:
         """Restore these weights, with a new optimiser, because the old moments belong to other weights."""
-        self.ensemble.load_state_dict(weights)
-        self.optimizer = None
+        self.model.load_state_dict(weights)
+        self.optimizer = self.moments = None
 
 
 def fabric_on(accelerator: str) -> Fabric:

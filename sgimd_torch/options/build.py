@@ -109,6 +109,8 @@ def build(config: Config) -> RunParts:
         raise ValueError(f"--until needs an inverse model that says how sure it is, such as process; {name} does not")
     parts = RunParts(config, task, learner, teacher, teachers, contents["benchmark"], data, notes)
     assert parts.inverses  # made here, so that their remarks are among the notes
+    if config.checkpoints and not learner.problem.trained:
+        raise ValueError("--checkpoints true needs a forward model, such as --inverse model")
     check_watcher(learner)  # an inverse model of the evaluations may have a forward model
     notes += learner.problem.remarks
     return parts

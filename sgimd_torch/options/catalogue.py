@@ -49,6 +49,7 @@ inverse      inverses.local_process     process=LocalProcess
 inverse      inverses.among_effects     among-effects=AmongEffects
 inverse      forward_model.proved       model=ProvedModel
 inverse      forward_model.inverse      model-alone=ModelAlone
+network      forward_model.networks     perceptrons=Perceptrons
 judge        competence                 memory=Competence attempt=AttemptCompetence
 social       strategies                 imitate=Imitate emulate=Emulate
 teacher      teachers                   periodic=PeriodicTeacher initial=InitialTeacher at-once asked=AskedTeacher

@@ -40,6 +40,7 @@ class Config:
         out: folder for runs; a run with seed 3 goes to OUT/NAME/seed-003.
         name: name of the variant, NAME in the path of the run; null: the algorithm.
         board: true to write curves and pictures for TensorBoard into the run's folder.
+        checkpoints: true to keep a checkpoint of the forward model at each evaluation.
         evaluate_at: numbers of movements after which to evaluate, besides the end; null: 250, 500 and every 1000; []:
             never, not even at the end.
         evaluated_by: inverse models to evaluate: first own, which is the run's, then names for --inverse.
@@ -64,6 +65,7 @@ class Config:
     out: Path = Path("runs")
     name: str | None = None
     board: bool = False
+    checkpoints: bool = False
     evaluate_at: tuple[int, ...] | None = None
     evaluated_by: tuple[str, ...] = (OWN,)
     repeats: int = 2

@@ -11,6 +11,7 @@ from sgimd_torch.options.config import RUN, Config, chosen, dashed
 from sgimd_torch.options.signature import Option, as_text, help_of, name_of
 
 _CHOOSE: Final = {"progress": "goals.progress", "choose": "teacher.choose"}  # options that choose parts of other parts
+_ELSEWHERE: Final = ("algorithm", "command", "network")  # kinds that have lists of their own, or help on their part
 _WIDTH: Final = 120  # signs in a line
 
 
@@ -18,7 +19,7 @@ def overview(description: str | None) -> str:
     """Text of ``sgimd run --help``: options and flags of every run, and names of parts."""
     rivals = [word for word, place in WORDS["algorithm"].items() if place.startswith("rivals.")]
     own = [word for word in WORDS["algorithm"] if word not in rivals]
-    parts = {_CHOOSE.get(kind, kind): words for kind, words in WORDS.items() if kind not in ("algorithm", "command")}
+    parts = {_CHOOSE.get(kind, kind): words for kind, words in WORDS.items() if kind not in _ELSEWHERE}
     lines = [
         "usage: sgimd run [--OPTION VALUE ...] [--resume]",
         "",

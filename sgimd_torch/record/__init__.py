@@ -41,7 +41,7 @@ from sgimd_torch.record.layout import (
 )
 from sgimd_torch.spaces import Demonstration
 
-__all__ = ["DERIVED", "Dims", "Record", "ReplayError", "RunError", "layout"]
+__all__ = ["DERIVED", "Dims", "Record", "ReplayError", "Row", "RunError", "layout"]
 
 _PATIENCE: Final = 0.1  # s, longest time that a commit waits for readers of other programs
 _ROWS_AT_ONCE: Final = 4096  # number of rows that one query reads

@@ -43,6 +43,7 @@ def layout(dims: Dims) -> dict[str, list[str]]:
     numbers = ["mean_error", "median_error", "p90_error", "noise_floor", "expected_error"]
     predicted = [column for name in ("predicted", "epistemic", "aleatoric") for column in _vector(name, t)]
     learnt = ["held_out REAL", "relative_error REAL", "diverged INTEGER"]
+    learnt += ["training_loss REAL", "gradient_norm REAL", "learning_rate REAL"]
     corners = [column for name in ("low", "high") for column in _vector(name, c + t)]
     interest = ["competence REAL", "interest REAL"]
     columns = {

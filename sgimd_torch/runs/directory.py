@@ -30,10 +30,10 @@ CODE: Final = (*WORDS, "evaluated_by", "robot", "seen_by")  # last words of opti
 THREADS: Final = "environment.threads"
 DEVICE: Final = "inverse.accelerator"
 # Settings in which runs may differ: they name, show or speed up a run.
-NOT_COMPARED: Final = ("seed", "out", "name", "board", THREADS, DEVICE)
+NOT_COMPARED: Final = ("seed", "out", "name", "board", "checkpoints", THREADS, DEVICE)
 EVALUATES: Final = ("evaluated_by", "repeats", "floor_at", "benchmark_crc32")  # equal options of all evaluations
 MAY_CHANGE: Final = (
-    *("movements", "until", "out", "name", "board", "failures", "evaluate_at"),
+    *("movements", "until", "out", "name", "board", "checkpoints", "failures", "evaluate_at"),
     *(*FILES, *EVALUATES, THREADS, DEVICE),
 )
 """Options that may change when a run is resumed, as they do not affect the learner. Files are compared by their
@@ -42,7 +42,7 @@ LONGEST: Final = 504  # bytes, longest path of a file that SQLite opens
 LIBRARIES: Final = ("numpy", "scipy", "faiss-cpu", "mujoco")
 FORWARD: Final = ("torch", "lightning")  # libraries of a forward model
 EVALUATED: Final = ("evaluations", "errors", "regions")  # tables that each evaluation adds to
-OF_MODEL: Final = ("predictions", "refreshes")  # tables that a forward model adds to
+OF_MODEL: Final = ("predictions", "refreshes")  # tables that a forward model adds to; it also clears them
 
 
 def open_run(parts: RunParts, *, resume: bool) -> tuple[Record, list[str]]:
@@ -81,7 +81,7 @@ def open_run(parts: RunParts, *, resume: bool) -> tuple[Record, list[str]]:
             notes.append(f"{path.parent} holds no run yet: the run starts from the beginning")
         record = Record.make(path, dims, about)
     elif resume:
-        record = _reopened(path, about, dims, config, notes)
+        record = _reopened(path, about, dims, parts, notes)
     else:
         raise RunError(f"{path.parent} already holds a run; continue it with --resume, or choose another --out")
     record.replace_rows("goals", ((k, *goal) for k, goal in enumerate(parts.benchmark.goals.tolist())))
@@ -129,12 +129,12 @@ def build_again(config: Config, *, recorded: bool = True) -> RunParts:
         return parts
 
 
-def _reopened(path: Path, about: dict[str, Any], dims: Dims, config: Config, notes: list[str]) -> Record:
+def _reopened(path: Path, about: dict[str, Any], dims: Dims, parts: RunParts, notes: list[str]) -> Record:
     """The record at ``path``, open for writing, without the tables that the replay fills again.
 
     ``about`` describes the run now, and gets the versions of earlier parts of the run. ``notes`` gets messages.
     """
-    record = Record(path, write=True)
+    record, config = Record(path, write=True), parts.config
     try:
         others = _refuse_other(record, about, dims)
         if record.movements > config.movements:
@@ -142,8 +142,9 @@ def _reopened(path: Path, about: dict[str, Any], dims: Dims, config: Config, not
         if "until" not in others:
             about["ended_early"] = record.about["ended_early"]
         _forget_evaluations(record, config, about["ended_early"], anew=bool(others & {*EVALUATES}), notes=notes)
-        for table in OF_MODEL:
-            record.replace_rows(table, ())
+        if not parts.learner.problem.trained:
+            for table in OF_MODEL:
+                record.replace_rows(table, ())
         about["versions"] = _with_earlier(record.about["versions"], about["versions"], notes)
         record.about |= about
     except BaseException:

@@ -8,6 +8,7 @@ evaluations.after(500)["own"].mean_error
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
@@ -57,6 +58,14 @@ class Evaluations:
     def last(self) -> Evaluation | None:
         """The last evaluation of the run's own inverse model, None if there is none."""
         return self._by_movements[max(self._by_movements)][OWN] if self._by_movements else None
+
+    @property
+    def first_missing(self) -> float:
+        """Number of movements before the first requested evaluation that is not in the record; infinite: none."""
+        config = self.parts.config
+        return next(
+            (m for m in config.evaluations if not any(config.due(made, [m]) for made in self._by_movements)), math.inf
+        )
 
     def after(self, movements: int) -> ByInverse | None:
         """The recorded evaluation after this number of movements, else a new evaluation of the present learner.

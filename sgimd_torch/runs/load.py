@@ -15,6 +15,7 @@ from sgimd_torch.record import ReplayError
 from sgimd_torch.record.saving import repeated
 from sgimd_torch.runs.directory import RUN_FILE, build_again, changed_versions, versions_of
 from sgimd_torch.runs.read import config_of, read_run
+from sgimd_torch.runs.run import Listening
 
 
 def load_learner(path: str | os.PathLike[str], *, trust: bool = False) -> Learner:
@@ -65,6 +66,10 @@ class OpenRun:
         last = math.inf if movements is None or movements >= len(self.recorded.index) else movements
         if learner.movements >= last:
             return
+        refreshes = [*zip(*(self.recorded.refreshes or {}).values(), strict=True)]
+        for part in learner.problem.trained:
+            if isinstance(part, Listening):
+                part.restore(self.recorded.path, refreshes, (learner.movements, last))
         try:
             for episode in self._episodes:
                 for model in learner.problem.trained:

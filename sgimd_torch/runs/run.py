@@ -8,17 +8,18 @@ from __future__ import annotations
 import math
 import time
 import traceback
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import Final, Protocol, Self, runtime_checkable
 
 from sgimd_torch.environments.protocol import FAILURES, SimulationError, reason_of
 from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.learner.events import Event, Kind
 from sgimd_torch.options.build import RunParts
-from sgimd_torch.record import ReplayError, RunError
+from sgimd_torch.record import ReplayError, Row, RunError
 from sgimd_torch.runs.at_once import executing
 from sgimd_torch.runs.directory import open_run
 from sgimd_torch.runs.evaluations import Evaluations, ends_now
@@ -87,9 +88,12 @@ class RunLoop:
         self.seconds = Seconds(self.record.about.get("seconds", {}))
         self.evaluations = Evaluations(parts, self.record)
         parts.learner.listeners.append(self._hear)
-        self.listeners: list[Listener] = [
-            part.listener(self) for part in parts.learner.problem.trained if isinstance(part, Listening)
-        ]
+        self.listeners: list[Listener] = []
+        for part in parts.learner.problem.trained:
+            if isinstance(part, Listening):
+                until = min(self.recorded, self.evaluations.first_missing)
+                part.restore(parts.config.directory, list(self.record.rows("refreshes")), (0, until))
+                self.listeners.append(part.listener(self))
         if parts.config.board:
             from sgimd_torch.board.listener import BoardListener  # loaded here, as most runs have no board
 
@@ -295,10 +299,19 @@ class Listener(Protocol):
 
 @runtime_checkable
 class Listening(Protocol):
-    """A trained part of a learner that has a listener in a run."""
+    """A trained part of a learner that has a listener in a run, and checkpoints."""
 
     def listener(self, loop: RunLoop) -> Listener:
         """The listener in the run ``loop``."""
+
+    def restore(self, directory: Path, refreshes: Sequence[Row], span: tuple[float, float]) -> None:
+        """Let the replay of the run in ``directory`` load the last usable checkpoint instead of training.
+
+        Args:
+            directory: directory of the run.
+            refreshes: rows of this table in the record of the run.
+            span: number of movements at which the checkpoint may be, above the first and up to the second.
+        """
 
 
 class Seconds:

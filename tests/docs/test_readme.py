@@ -34,7 +34,7 @@ HOW_TO = tuple(
     f"docs/{name}.md"
     for name in ("own-robot", "reading-runs", "own-demonstrations", "teaching-by-hand", "own-teacher", "asking")
 )
-SLOW = ("docs/tutorial.md", "docs/how-to/forward-model.md")  # the rod's physics; torch
+SLOW = ("docs/tutorial.md", "docs/how-to/forward-model.md", "docs/how-to/own-network.md")  # the rod's physics; torch
 PAGES = [
     *ALONE,
     "CHANGELOG.md",

@@ -86,8 +86,8 @@ def test_doubt_grows_from_nothing_at_an_anchor_and_counts_by_caution(model, memo
 
 def test_a_share_of_the_predicted_spread_counts_and_a_noisy_anchor_by_doubt_over_doubt_and_noise(memory, fixed):
     model = ForwardModel(0, 7, 2)
-    model.weights[-1].data[:] = 0.0  # untrained: it says 0
-    model.biases[-1].data[..., 2:] = np.log(0.5)  # with a noise of .5 m^2
+    model.networks.weights[-1].data[:] = 0.0  # untrained: it says 0
+    model.networks.biases[-1].data[..., 2:] = np.log(0.5)  # with a noise of .5 m^2
     model.missed.fill_(2.0)
     for share, caution in ((0.0, 0.0), (0.3, 0.0), (1.0, 0.0), (1.0, 1.0)):
         fixed(share=share, caution=caution)

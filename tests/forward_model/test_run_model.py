@@ -9,12 +9,14 @@ import sys
 
 import numpy as np
 import pytest
+import torch
 
 from boards import curves_of
 from runs import ROOT, about_of, content_of, write_about
 from sgimd_torch.board.legend import LEGEND
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import Benchmark, save_benchmark
+from sgimd_torch.forward_model.checkpoints import Checkpoints
 from sgimd_torch.forward_model.model import ForwardModel
 from sgimd_torch.forward_model.shared import ModelListener
 from sgimd_torch.memory import Memory
@@ -23,12 +25,12 @@ from sgimd_torch.options.command_line import main
 from sgimd_torch.options.config import Config
 from sgimd_torch.record import Record, ReplayError, layout
 from sgimd_torch.runs.directory import RUN_FILE
-from sgimd_torch.runs.load import load_learner
+from sgimd_torch.runs.load import OpenRun, load_learner
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.run import Seconds
 from sgimd_torch.runs.signals import command
 from sgimd_torch.spaces import Episode, Move, stream
-from worlds import NO_CONTEXT
+from worlds import NO_CONTEXT, executed
 
 MOVEMENTS = 170
 MODEL = ("--inverse", "model-alone", "--search", "gradient", "--inverse.rate", 2)
@@ -79,7 +81,8 @@ def test_recorded_predictions_are_those_of_a_model_of_all_earlier_movements(refe
 
 def test_every_refresh_is_recorded(reference):
     columns, refreshes = table(reference, "refreshes")
-    assert columns == ["movements", "exemplars", "steps", "held_out", "relative_error", "diverged"]
+    learnt = ["held_out", "relative_error", "diverged", "training_loss", "gradient_norm", "learning_rate"]
+    assert columns == ["movements", "exemplars", "steps", *learnt]
     assert refreshes[:, 0].tolist() == refreshes[:, 1].tolist() == [50, 100, 150]
     assert refreshes[:, 2].tolist() == [100, 100, 100]  # 2 a movement
     assert refreshes[-1, 4] < 0.17
@@ -96,6 +99,95 @@ def test_a_run_made_longer_equals_a_long_run_and_so_does_its_board(tmp_path, liv
     resumed, whole = curves_of(directory), curves_of(reference)
     assert {tag for tag in whole if tag.startswith("model/")} == TAGS
     assert {tag: resumed[tag] for tag in TAGS} == {tag: whole[tag] for tag in TAGS}
+
+
+ALONE = ("--inverse", "model-alone", "--board", "true", "--checkpoints", "true", "--evaluate-at", "60,120")
+
+
+@pytest.fixture(scope="module")
+def unguided(tmp_path_factory, live):
+    """Directory of a whole run that learns without the model and answers evaluations by it."""
+    return live(tmp_path_factory.mktemp("unguided"), *ALONE)
+
+
+def model_at(directory, movements=None):
+    run = OpenRun(directory)
+    run.replay(movements)
+    (shared,) = run.parts.learner.problem.trained
+    return shared.model
+
+
+def copied(directory, tmp_path):
+    return shutil.copytree(directory, tmp_path / directory.parent.name / directory.name)
+
+
+def test_a_replay_loads_the_checkpoint_of_its_moment_and_equals_one_that_trains(unguided, tmp_path):
+    names = sorted(path.name for path in (unguided / "checkpoints").iterdir())
+    assert names == ["000060.ckpt", "000120.ckpt", "000170.ckpt", "last.ckpt"]
+    trains = copied(unguided, tmp_path)
+    shutil.rmtree(trains / "checkpoints")
+    for movements, loads in ((40, False), (60, True), (130, True), (None, True)):
+        loaded, trained = model_at(unguided, movements), model_at(trains, movements)
+        assert (loaded._online.moments is not None) == loads  # of an optimiser that nothing has trained since
+        assert trained._online.moments is None
+        assert all(map(torch.equal, loaded.state_dict().values(), trained.state_dict().values()))
+        assert torch.equal(loaded._online.generator.get_state(), trained._online.generator.get_state())
+
+
+@pytest.mark.parametrize("evaluated", ["60,120", "120"])
+def test_a_run_made_longer_from_a_checkpoint_equals_a_long_run(tmp_path, live, unguided, evaluated):
+    wanted = (*ALONE[:-1], evaluated)
+    directory = live(tmp_path, *wanted, "--movements", 120)
+    live(tmp_path, *ALONE, "--resume")  # an evaluation that the first run has not made needs the model of its moment
+    assert content_of(directory) == content_of(unguided)
+    resumed, whole = curves_of(directory), curves_of(unguided)
+    assert {tag: resumed[tag] for tag in TAGS} == {tag: whole[tag] for tag in TAGS}
+    for name in ("000120", "000170", "last"):
+        one, other = (torch.load(at / "checkpoints" / f"{name}.ckpt") for at in (directory, unguided))
+        assert str(one) == str(other)
+
+
+def test_a_learner_that_the_model_has_guided_trains_it_again(reference):
+    assert (reference / "checkpoints" / "last.ckpt").exists()
+    assert model_at(reference)._online.moments is None
+
+
+def of_another_robot(path):
+    model = ForwardModel(0, 8, 2, seed=3)
+    model.refresh(executed(PlanarArm(8), stream(0, "thetas").random((60, 8))))
+    Checkpoints(path.parents[1]).write("last", model, (150, 150))
+
+
+def changed(**entries):
+    return lambda path: torch.save({**torch.load(path), **entries}, path)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (lambda path: path.write_bytes(path.read_bytes()[:1000]), "cannot be read as a checkpoint: "),
+        (of_another_robot, "is of another model: theta_dim 8, here 7"),
+        (changed(made_by="0.1"), "was written by version 0.1, this is "),
+        (changed(refresh=[150, 150, 50, 0.1]), "is of another run"),
+        (changed(state_dict={}), "has weights of other shapes"),
+    ],
+)
+def test_a_checkpoint_of_another_model_is_told_in_one_line_and_nothing_is_lost(
+    unguided, tmp_path, spoil, message, capsys
+):
+    directory = copied(unguided, tmp_path)
+    spoil(directory / "checkpoints" / "last.ckpt")
+    model = model_at(directory)
+    said = capsys.readouterr().err
+    assert message in said
+    assert said.count("\n") == 1
+    assert model.relative_error == model_at(unguided).relative_error
+
+
+def test_checkpoints_without_a_model_are_refused(tmp_path, capsys):
+    assert command(main, ["--environment", "planar-arm-7", "--checkpoints", "true", "--out", str(tmp_path)]) == 2
+    assert "--checkpoints true needs a forward model" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
 
 
 MISSING = ("--inverse.accelerator", "tpu")
@@ -196,7 +288,7 @@ def listen(tmp_path):
 
         def listen(n, before=lambda index, model: None):
             model, memory, arm = ForwardModel(0, 7, 2, rate=1.0), Memory(0, 7, 2), PlanarArm(7)
-            listener = ModelListener(record, model, lambda: model.trusted, memory, Seconds({}))
+            listener = ModelListener(record, model, lambda: model.trusted, memory, Seconds({}), Checkpoints(tmp_path))
             rng, curves = stream(0, "exemplars"), []
             for index in range(n):
                 theta = rng.random(7)
@@ -221,13 +313,15 @@ def test_a_divergence_is_told_and_recorded(listen, capsys):
     assert [index for index, numbers in enumerate(curves) if numbers] == [49, 99, 149]
     text = "movement 100: training diverged; the forward model keeps its last good weights"
     assert capsys.readouterr().err.count(text) == 1
-    assert [row[-1] for row in record.rows("refreshes")] == [0, 1, 0]
+    assert [row[5] for row in record.rows("refreshes")] == [0, 1, 0]
 
 
 def test_the_curves_are_those_of_the_newest_refresh(listen):
     record, model, curves = listen(100)
-    assert curves[49].keys() == TAGS - {"model/error", "model/coverage"}
-    assert curves[99].keys() == TAGS
+    assert curves[49].keys() == TAGS - {"model/error", "model/coverage"} | {"time/training_step"}
+    assert curves[99].keys() == TAGS | {"time/training_step"}
+    assert curves[99]["model/learning_rate"] == 0.01
+    assert curves[99]["model/training_loss"] < curves[99]["model/held_out"]
     assert curves[99]["model/relative_error"] == model.relative_error
     predictions = np.array(list(record.rows("predictions")))
     outcome, predicted, epistemic, aleatoric = np.split(predictions[:, 1:], 4, axis=1)
@@ -238,13 +332,16 @@ def test_the_curves_are_those_of_the_newest_refresh(listen):
 
 def test_a_run_through_the_model_makes_one_of_the_size_of_its_robot_with_its_options():
     networks = {"inverse.members": 2, "inverse.rate": 1.5, "inverse.noise_heads": False, "inverse.trust": 0.2}
+    networks |= {"inverse.widths": (8,), "inverse.activation": "tanh", "inverse.lr": 0.1, "inverse.batch": 5}
     parts = {"search": "gradient", "inverse": "model", "environment": "fishing-rod", **networks}
     learner = build(Config(algorithm="sagg-riac", parts=parts)).learner
     (shared,) = learner.problem.trained
     model = shared.model
     assert model is learner.inverse.model
     assert model.sizes == {"context_dim": 0, "theta_dim": 25, "outcome_dim": 2}
-    assert (model.members, model.rate, model.noise_heads, model.trust) == (2, 1.5, False, 0.2)
+    assert (model.members, model.rate, model.trust) == (2, 1.5, 0.2)
+    assert model.hparams.items() >= {"noise_heads": False, "activation": "tanh", "lr": 0.1, "batch": 5}.items()
+    assert [tuple(weight.shape) for weight in model.networks.weights] == [(2, 25, 8), (2, 8, 4)]
     assert build(Config(parts={"search": "nelder-mead"})).learner.problem.trained == []
 
 

@@ -64,11 +64,11 @@ def test_events_come_back_exactly_and_each_demonstration_is_kept_once(tmp_path_f
 def test_nan_is_null_and_minus_zero_is_zero(tmp_path):
     path = fill(tmp_path / "run.sqlite")
     with Record(path, write=True) as record:
-        record.add_rows("refreshes", [(50, 50, np.int64(7), np.float64("nan"), -0.0, 0)])
+        record.add_rows("refreshes", [(50, 50, np.int64(7), np.float64("nan"), -0.0, 0, 1.0, 2.0, 0.01)])
         record.add(moved([-0.0, 0.5, 1.0], goal=[np.nan, 0.5]))  # of a strategy of one's own
         record.commit()
     with Record(path) as record:
-        assert list(record.rows("refreshes"))[-1] == (50, 50, 7, None, 0.0, 0)
+        assert list(record.rows("refreshes"))[-1] == (50, 50, 7, None, 0.0, 0, 1.0, 2.0, 0.01)
         *_, event = record.events()
         assert event.goal is None
         assert event.theta.tolist() == [0.0, 0.5, 1.0]

@@ -1,7 +1,8 @@
 """Films of robots from model files: MuJoCo draws robot and objects, with the goal, T and the path between them.
 
     with ModelCamera(robot, shots) as camera: write_film(Path("film.mp4"), shoot(camera, shots))
-The model's own camera is used if it is fixed to the world and sees all of T. Else a camera is placed where it does.
+The model's own camera is used if it is fixed to the world and sees all of T. Else a camera is placed where it does. A
+model without a floor or a light gets them, because shadows on a floor show how far away things are.
 """
 
 from __future__ import annotations
@@ -17,12 +18,14 @@ from PIL import Image
 
 from sgimd_torch.environments.mujoco_robot import Filmed, MujocoRobot
 from sgimd_torch.spaces import Array
-from sgimd_torch.views.film.camera import GOAL, MOST_PAST, PAST, MujocoPainter, add_geom, draw_chain
+from sgimd_torch.views.film.camera import GOAL, MOST_PAST, MujocoPainter, add_geom, draw_chain
 from sgimd_torch.views.film.reel import HEIGHT, WIDTH, Shot
 
 FILLED: Final = 0.8  # share of the picture, in height and width, that shows robot and T
 BORDER: Final = (0.2, 0.5, 0.6, 1.0)  # colour of the border of T
 PATH: Final = (0.88, 0.54, 0.33, 1.0)  # colour of the paths of measured places
+FLOOR: Final = (0.55, 0.6, 0.66, 1.0)  # colour of the floor of a model without one
+REACHED: Final = (0.8, 0.2, 0.6, 1.0)  # colour of past outcomes, unlike that of anything else
 END: Final = (0.82, 0.2, 0.12, 1.0)  # colour of the measured places
 BALL: Final = mujoco.mjtGeom.mjGEOM_SPHERE
 
@@ -40,14 +43,16 @@ class ModelCamera(MujocoPainter):
         self._robot = robot
         if not self._model.nlight:
             light = self._model.vis.headlight
-            light.ambient[:], light.diffuse[:] = 0.4, 0.6
-        for effect in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):  # three times slower
-            self._renderer.scene.flags[effect] = False
+            light.ambient[:], light.diffuse[:] = 0.4, 0.2
+        self._renderer.scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False  # slow
         corners = np.concatenate([_edges(robot, shot).reshape(-1, 3) for shot in shots])
         arm = [self._at(state).xpos[robot.bodies] for shot in shots for state in _filmed(shot).states[::5]]
         seen = np.concatenate([corners, *arm])
         self._camera = viewing(self._model, self._data, seen)
         self._far = float(np.ptp(seen, axis=0).max())
+        self._at(_filmed(shots[0]).states[0])
+        low = (self._data.geom_xpos[:, 2] - self._model.geom_rbound)[self._model.geom_rbound > 0]
+        self._ground = np.append(seen.mean(axis=0)[:2], min(seen[:, 2].min(), low.min(initial=np.inf)))
 
     def frame(self, shot: Shot, time: float) -> Image.Image:
         """The scene at ``time`` (s); after the end of the movement, the last state and the outcome.
@@ -59,12 +64,13 @@ class ModelCamera(MujocoPainter):
         row = min(round(time / recording.step), len(recording.states) - 1)
         self._renderer.update_scene(self._at(recording.states[row]), camera=self._camera)
         scene, size = self._renderer.scene, 0.012 * self._far
+        self._furnish(scene)
         for edge in _edges(self._robot, shot):
             draw_chain(scene, edge, 0, BORDER)
         for place in self._robot.located(shot.past[:: max(1, math.ceil(len(shot.past) / MOST_PAST))], start).reshape(
             -1, 3
         ):
-            add_geom(scene, BALL, (size / 3, 0, 0), place, PAST)
+            add_geom(scene, BALL, (size / 2, 0, 0), place, REACHED).emission = 0.5
         for k, goal in enumerate(self._robot.located(shot.goal[None], start)[0]):
             path = recording.path[: row + 1, k]
             draw_chain(scene, path, 0, PATH)
@@ -73,6 +79,19 @@ class ModelCamera(MujocoPainter):
             if time >= recording.landed:
                 draw_chain(scene, [goal, path[-1]], 0.4 * size, GOAL)
         return Image.fromarray(self._renderer.render())
+
+    def _furnish(self, scene: mujoco.MjvScene) -> None:
+        """Add a floor, and a light with shadows, if the model has none."""
+        model, far = self._model, self._far
+        if not (model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE).any():
+            add_geom(scene, mujoco.mjtGeom.mjGEOM_PLANE, (9 * far, 9 * far, 1), self._ground, FLOOR)
+        if not model.nlight:
+            light = scene.lights[scene.nlight]
+            light.pos[:], light.dir[:] = self._ground + np.array([far, -far, 4 * far]), (-0.24, 0.24, -0.94)
+            light.ambient[:], light.diffuse[:], light.specular[:] = 0.0, 0.5, 0.1
+            light.type, light.headlight, light.castshadow = mujoco.mjtLightType.mjLIGHT_SPOT, 0, 1
+            light.attenuation[:], light.cutoff, light.exponent = (1, 0, 0), 80, 0
+            scene.nlight += 1
 
 
 def viewing(model: mujoco.MjModel, data: mujoco.MjData, points: Array) -> int | mujoco.MjvCamera:

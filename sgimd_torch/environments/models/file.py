@@ -1,0 +1,199 @@
+"""Model files, MJCF or URDF, made ready for movements: position servos, a start posture, contacts that are left out.
+
+robot = load_model(Path("arm.xml"), (), "auto", "", ()); robot.model, robot.start, robot.remarks
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final, NamedTuple
+from xml.etree import ElementTree
+
+import mujoco
+import numpy as np
+
+from sgimd_torch.environments.models.look import listed
+from sgimd_torch.environments.models.places import UNITS, joint_of, pulled
+from sgimd_torch.environments.models.posture import movable, nearest_posture, touching, within_ranges
+from sgimd_torch.environments.models.servos import joints_to_serve, serve
+from sgimd_torch.files import check_regular
+from sgimd_torch.options.catalogue import unknown_name_error
+from sgimd_torch.spaces import check_point
+
+SERVOS: Final = ("auto", "file", "made")
+_HOMES: Final = ("home", "rest")  # names of keyframes in which movements begin unless another one is chosen
+
+
+class Loaded(NamedTuple):
+    """A model that is ready for movements; limits of joints are known by name, as far as there are any."""
+
+    model: mujoco.MjModel
+    start: mujoco.MjData  # state in which movements begin
+    posture: tuple[float, ...]  # positions of the joints that turn or slide, at the start
+    speeds: dict[str, float]  # rad/s or m/s
+    accelerations: dict[str, float]  # rad/s^2 or m/s^2
+    remarks: list[str]
+
+
+def file_of(model: str | Path) -> Path:
+    """The file of a model: its path, or the scene of a robot of the package mujoco-menagerie, such as menagerie:aloha.
+
+    Raises:
+        ValueError: the package is not installed, it has no such robot, or it cannot download the robot.
+    """
+    collection, _, name = str(model).partition(":")
+    if collection != "menagerie":
+        return Path(model)
+    try:
+        import mujoco_menagerie  # an optional dependency
+    except ImportError as error:
+        raise ValueError(f"{model} needs a package that is not installed: pip install mujoco-menagerie") from error
+    try:
+        return Path(mujoco_menagerie.get(name).xml())
+    except mujoco_menagerie.MenagerieError as error:
+        raise ValueError(f"model {model}: {error}") from error
+
+
+def load_model(path: Path, joints: Sequence[str], servos: str, keyframe: str, posture: Sequence[float]) -> Loaded:
+    """The model in a file; see `MujocoRobot` for the options.
+
+    Raises:
+        ValueError: MuJoCo refuses the file, there is nothing that moves, or an option does not fit.
+        OSError: there is no such file.
+    """
+    check_regular(path)  # MuJoCo's own message of a missing file is no OSError
+    if servos not in SERVOS:
+        raise unknown_name_error("servos", servos, SERVOS)
+    if path.suffix.lower() == ".sdf":
+        raise ValueError(f"{path.name} is an SDF file; MuJoCo reads MJCF and URDF, so give the robot's URDF")
+    remarks, accelerations = list[str](), dict[str, float]()
+    try:
+        spec = mujoco.MjSpec.from_file(str(path))
+        for mesh in spec.meshes:
+            mesh.file = _of_package(path, mesh.file)
+        for kind in (spec.bodies, spec.sites, spec.joints):  # a hand leads an arm by a name
+            for k, element in enumerate(kind):
+                element.name = element.name or f"unnamed_{k}"
+        spec.compiler.fusestatic = False  # else links on fixed joints of a URDF, such as its tool, lose their names
+        model, root = spec.compile(), ElementTree.parse(path).getroot()
+        alone, limits = root.tag == "robot", [(joint, joint.find("limit")) for joint in root.iter("joint")]
+        # MuJoCo does not read the speeds of a URDF.
+        speeds = {
+            joint.get("name", ""): float(limit.get("velocity", 0)) for joint, limit in limits if limit is not None
+        }
+        if served := joints_to_serve(model, servos, joints, alone=alone):
+            cause, held = "motors that are no servos" if model.nu else "no actuators", len(pulled(model))
+            model, accelerations = serve(spec, model, served)
+            names = ", ".join(model.joint(k).name for k in served)
+            remarks.append(f"{path.name} has {cause}: position servos were made for {names}")
+            if held > len(pulled(model)):
+                remarks.append("constraints to mocap bodies, which would hold the arm, were left out")
+        arm = [joint for k in range(model.nu) if (joint := joint_of(model, k)) is not None]
+        arm = sorted({joint for joint in arm if int(model.jnt_type[joint]) in UNITS})
+        bodies = _robot(model, arm, alone=alone)
+        model = _without(spec, model, _beside_base(model, bodies))
+        keys = [model.key(k).name for k in range(model.nkey)]
+        if keyframe and keyframe not in keys:
+            raise unknown_name_error(f"keyframe of {path.name}", keyframe, keys)
+        keyframe = keyframe or next((key for home in _HOMES for key in keys if key.lower() == home), "")
+        data = _reset(model, keyframe)
+        if posture:
+            data.qpos[model.jnt_qposadr[movable(model)]] = check_point("posture", posture, len(movable(model)))
+        else:
+            remarks += _take_posture(model, data, arm, bodies, keyframe)
+        mujoco.mj_forward(model, data)
+        if resting := {pair for pair in touching(model, data, bodies) if pair[0]}:
+            links = listed([" and ".join(model.body(body).name for body in pair) for pair in sorted(resting)])
+            remarks += [f"contacts in the start posture are left out: {links}"] if not posture else []
+            start, model = np.array(data.qpos), _without(spec, model, resting)
+            data = _reset(model, keyframe)
+            data.qpos[:] = start
+        kept = tuple(float(x) for x in data.qpos[model.jnt_qposadr[movable(model)]])
+        return Loaded(
+            model, data, kept, {name: speed for name, speed in speeds.items() if speed > 0}, accelerations, remarks
+        )
+    except ValueError as error:
+        raise ValueError(f"{path.name} cannot be used: {_with_advice(' '.join(str(error).split()), path)}") from error
+
+
+def files_of(path: Path) -> list[Path]:
+    """The file of a model, and all files that it includes or refers to, such as meshes."""
+    spec, files = mujoco.MjSpec.from_file(str(path)), {path, *map(Path, mujoco.mju_getXMLDependencies(str(path)))}
+    files |= {path.parent / spec.meshdir / _of_package(path, mesh.file) for mesh in spec.meshes if mesh.file}
+    return sorted({file.resolve() for file in files if file.is_file()})
+
+
+def _reset(model: mujoco.MjModel, keyframe: str) -> mujoco.MjData:
+    """The state of a keyframe, "" for the initial state."""
+    data = mujoco.MjData(model)
+    if keyframe:
+        mujoco.mj_resetDataKeyframe(model, data, model.key(keyframe).id)
+    return data
+
+
+def _take_posture(
+    model: mujoco.MjModel, data: mujoco.MjData, arm: Sequence[int], bodies: Sequence[int], keyframe: str
+) -> list[str]:
+    """Put the nearest posture within all ranges and without contacts of ``bodies`` into ``data``; a keyframe stays."""
+    before, data.qpos[:] = np.array(data.qpos), within_ranges(model, data.qpos)
+    outside = [model.joint(k).name for k in movable(model) if data.qpos[a := model.jnt_qposadr[k]] != before[a]]
+    if keyframe:
+        data.qpos[:] = before
+        return [f"keyframe {keyframe} puts {', '.join(outside)} outside the range"] * bool(outside)
+    mujoco.mj_forward(model, data)
+    if touched := bool(touching(model, data, bodies)):
+        data.qpos[:] = nearest_posture(model, np.array(data.qpos), arm, bodies)
+    way = float(np.abs(data.qpos - before).max(initial=0))
+    causes = [f"{', '.join(outside)} outside the range"] * bool(outside) + ["links that touch"] * touched
+    said = (
+        f"it begins with {' and '.join(causes)}: movements begin in the nearest right posture, {way:.2g} rad or m off; "
+        "for another, write a <key> named home into the model, or give --environment.keyframe"
+    )
+    return [said] * (way > 1e-6)
+
+
+def _robot(model: mujoco.MjModel, arm: Sequence[int], *, alone: bool) -> list[int]:
+    """Bodies of the trees that ``arm`` moves, their bases too."""
+    roots = {int(model.body_rootid[model.jnt_bodyid[k]]) for k in arm}
+    return [k for k in range(model.nbody) if (int(model.body_rootid[k]) in roots if k else alone)]
+
+
+def _beside_base(model: mujoco.MjModel, bodies: Sequence[int]) -> set[tuple[int, int]]:
+    """Pairs of a base and the link on it; MuJoCo leaves out contacts of a body with its parent, but not with a base."""
+    fixed = [k for k in bodies if not model.body_weldid[k]]
+    links = [k for k in bodies if model.body_weldid[k] and not model.body_weldid[model.body_parentid[k]]]
+    return {(base, link) for base in fixed for link in links if model.body_rootid[base] in (0, model.body_rootid[link])}
+
+
+def _without(spec: mujoco.MjSpec, model: mujoco.MjModel, pairs: set[tuple[int, int]]) -> mujoco.MjModel:
+    """The model without contacts between these pairs of bodies."""
+    known = {frozenset((exclude.bodyname1, exclude.bodyname2)) for exclude in spec.excludes}
+    named = [tuple(model.body(body).name for body in pair) for pair in sorted(pairs)]
+    new = [pair for pair in named if frozenset(pair) not in known]
+    for one, other in new:
+        spec.add_exclude(bodyname1=one, bodyname2=other)
+    return spec.compile() if new else model
+
+
+def _of_package(path: Path, file: str) -> str:
+    """The place of package://NAME/FILE, a mesh of ROS, in the folder NAME or beside it; other files unchanged."""
+    head, _, rest = file.removeprefix("package://").partition("/")
+    if not file.startswith("package://"):
+        return file
+    places = [folder / name for folder in path.resolve().parents for name in (f"{head}/{rest}", rest)]
+    place = next((place for place in places if place.is_file()), None)
+    if place is None:
+        raise ValueError(f"no folder from {path.resolve().parent} up has the mesh {file}; put the folder {head} there")
+    return str(place)
+
+
+def _with_advice(said: str, path: Path) -> str:
+    """A message of MuJoCo, with what to do."""
+    line = '<compiler balanceinertia="true"/>'
+    line = f"<mujoco>{line}</mujoco>" if path.suffix.lower() == ".urdf" else line
+    advice = {
+        "balanceinertia": f"; write {line} into {path.name}, after its first tag",
+        "find decoder": "; MuJoCo reads models as MJCF or URDF, and meshes as .stl, .obj or .msh",
+    }
+    return said + "".join(text for word, text in advice.items() if word in said)

@@ -1,0 +1,80 @@
+"""The posture in which movements begin: within all ranges, and without contacts of the robot with itself.
+
+qpos = nearest_posture(model, within_ranges(model, qpos), joints, bodies) is found once; a run keeps it.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from typing import Final
+
+import mujoco
+import numpy as np
+from scipy.optimize import minimize
+
+from sgimd_torch.environments.models.places import UNITS
+from sgimd_torch.spaces import Array
+
+NEAR: Final = 0.004  # m, distance of two geoms that counts as a contact while a posture is looked for
+_WEIGHTS: Final = (1e3, 1e5, 1e7)  # 1/m^2, growing weight of contacts against the way (rad or m) to a posture
+
+
+def movable(model: mujoco.MjModel) -> list[int]:
+    """Joints that turn or slide."""
+    return [k for k in range(model.njnt) if int(model.jnt_type[k]) in UNITS]
+
+
+def within_ranges(model: mujoco.MjModel, qpos: Array) -> Array:
+    """``(nq,)``, the nearest positions within the ranges of all joints."""
+    within = np.array(qpos)
+    for k in movable(model):
+        if model.jnt_limited[k]:
+            within[model.jnt_qposadr[k]] = np.clip(within[model.jnt_qposadr[k]], *model.jnt_range[k])
+    return within
+
+
+def touching(model: mujoco.MjModel, data: mujoco.MjData, bodies: Sequence[int]) -> set[tuple[int, int]]:
+    """Pairs of ``bodies`` that touch each other in the state of ``data``, the lower number first."""
+    pairs = (sorted(int(model.geom_bodyid[geom]) for geom in contact.geom) for contact in _contacts(data))
+    return {(one, other) for one, other in pairs if {one, other} <= {*bodies}}
+
+
+def nearest_posture(model: mujoco.MjModel, home: Array, joints: Sequence[int], bodies: Sequence[int]) -> Array:
+    """``(nq,)``, the positions nearest to ``home`` in which ``bodies`` do not touch each other; contacts may be left.
+
+    ``home`` lies within all ranges; only ``joints`` move.
+    """
+    wide = copy.copy(model)  # sees contacts before they begin
+    wide.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_OVERRIDE)
+    wide.opt.o_margin = NEAR
+    data, angles, dofs = mujoco.MjData(wide), model.jnt_qposadr[[*joints]], model.jnt_dofadr[[*joints]]
+    data.qpos[:], q = home, home[angles]
+
+    def cost(q: Array, weight: float) -> tuple[float, Array]:
+        data.qpos[angles] = q
+        mujoco.mj_kinematics(wide, data)
+        mujoco.mj_comPos(wide, data)
+        mujoco.mj_collision(wide, data)
+        value, slope = float(np.square(q - home[angles]).sum()), 2 * (q - home[angles])
+        for contact in _contacts(data, NEAR):
+            ends = [int(wide.geom_bodyid[geom]) for geom in contact.geom]
+            if {*ends} <= {*bodies}:
+                jacobians = np.zeros((2, 3, wide.nv))
+                for jacobian, body in zip(jacobians, ends, strict=True):
+                    mujoco.mj_jac(wide, data, jacobian, None, contact.pos, body)
+                depth, away = NEAR - contact.dist, contact.frame[:3] @ (jacobians[1] - jacobians[0])
+                value += weight * depth**2
+                slope -= 2 * weight * depth * away[dofs]
+        return value, slope
+
+    limited = model.jnt_limited[[*joints]].astype(bool)
+    low, high = np.where(limited, model.jnt_range[[*joints]].T, [[-np.inf], [np.inf]])
+    for weight in _WEIGHTS:
+        q = minimize(cost, q, (weight,), "L-BFGS-B", jac=True, bounds=[*zip(low, high, strict=True)]).x
+    data.qpos[angles] = q
+    return np.array(data.qpos)
+
+
+def _contacts(data: mujoco.MjData, near: float = 0.0) -> list[mujoco.MjContact]:
+    return [contact for contact in data.contact if contact.dist < near and min(contact.geom) >= 0]

@@ -1,0 +1,125 @@
+"""Position servos for the joints of a model that has motors, or no actuators at all.
+
+model = serve(spec, spec.compile(), joints_to_serve(...)); a command of an actuator is then a position to go to.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import Final
+
+import mujoco
+import numpy as np
+
+from sgimd_torch.environments.models.places import UNITS, is_servo, joint_of, joints_above, pulled
+from sgimd_torch.spaces import Array, stream
+
+FREQUENCY: Final = 30.0  # rad/s, natural frequency of a servo
+SHARE: Final = 0.5  # share of the force of a joint that its commands may ask for to accelerate it
+SAG: Final = 0.01  # rad or m, largest error of a servo that holds a joint against friction and weight
+_STIFFEST: Final = 0.5  # largest product of a servo's natural frequency and the timestep; 2 is unstable
+_POSTURES: Final = 50  # number of random postures that measure inertias and loads
+
+
+def joints_to_serve(model: mujoco.MjModel, servos: str, joints: Sequence[str], *, alone: bool) -> list[int]:
+    """Joints that get a position servo; see ``servos`` of `MujocoRobot`.
+
+    If nothing acts on a joint, the robot is the tree of bodies that has one of ``joints``, else the largest tree. A
+    model that is ``alone`` has nothing but the robot.
+    """
+    acted = dict[int, list[int]]()
+    for k in range(model.nu):
+        if (joint := joint_of(model, k)) is not None and int(model.jnt_type[joint]) in UNITS:
+            acted.setdefault(joint, []).append(k)
+    if servos == "file":
+        return []
+    if servos == "auto" and model.nu:
+        return [joint for joint, actuators in acted.items() if not any(is_servo(model, k) for k in actuators)]
+    movable = [k for k in range(model.njnt) if int(model.jnt_type[k]) in UNITS]
+    chosen = {*acted, *(k for _, body in pulled(model) for k in joints_above(model, body) if k in movable)}
+    if chosen:
+        return sorted(chosen)
+    roots = [int(model.body_rootid[model.jnt_bodyid[k]]) for k in movable]
+    sizes = Counter(roots)
+    wanted = {root for root, k in zip(roots, movable, strict=True) if model.joint(k).name in joints}
+    wanted = wanted or {root for root, size in sizes.items() if alone or size == max(sizes.values())}
+    return [k for root, k in zip(roots, movable, strict=True) if root in wanted]
+
+
+def serve(spec: mujoco.MjSpec, model: mujoco.MjModel, chosen: Sequence[int]) -> tuple[mujoco.MjModel, dict[str, float]]:
+    """Give position servos to ``chosen`` joints, in place of their motors, and compile; with their accelerations.
+
+    As those of an arm that one can buy, the servos know the weight of the links: it is compensated. A servo moves the
+    greatest inertia of its joint with the natural frequency, and outweighs damping and friction. The force of a motor
+    stays within its limits. Nothing else may pull the arm: constraints to mocap bodies go.
+    """
+    names = [model.joint(k).name for k in chosen]
+    if not names:
+        raise ValueError("it has no joint that turns or slides")
+    bodies = {body.name: body for body in spec.bodies}
+    for k in range(1, model.nbody):
+        above = joints_above(model, k)
+        if above and {*above} <= {*chosen}:  # nothing passive below it
+            bodies[model.body(k).name].gravcomp = 1
+    for k in reversed([k for k, body in pulled(model) if {*joints_above(model, body)} & {*chosen}]):
+        spec.delete(spec.equalities[k])
+    motors = dict[str, mujoco.MjsActuator]()
+    for k, actuator in reversed([*enumerate(spec.actuators)]):
+        joint = joint_of(model, k)
+        if joint in chosen:
+            if actuator.target in motors:
+                spec.delete(motors[actuator.target])
+            motors[actuator.target] = actuator
+            if (effort := _effort(model, k)) and not model.jnt_actfrclimited[joint]:
+                spec.joint(actuator.target).actfrcrange, spec.joint(actuator.target).actfrclimited = (
+                    [-effort, effort],
+                    1,
+                )
+    for name in names:
+        spec.joint(name).actgravcomp = 1
+    for key in spec.keys:  # its commands are those of motors
+        key.ctrl, key.act = [], []
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST  # stable with the damping of light joints
+    compensated = spec.compile()
+    inertias, loads = _burdens(compensated, chosen)
+    accelerations = dict[str, float]()
+    for name, k in zip(names, chosen, strict=True):
+        dof = int(model.jnt_dofadr[k])
+        inertia, damping = inertias[dof], float(compensated.dof_damping[dof])
+        stiffness = max(inertia * FREQUENCY**2, damping * FREQUENCY / 2, loads[dof] / SAG)
+        stiffness = min(stiffness, inertia * (_STIFFEST / compensated.opt.timestep) ** 2)
+        if compensated.jnt_actfrclimited[k]:
+            accelerations[name] = SHARE * float(np.abs(compensated.jnt_actfrcrange[k]).max()) / inertia
+        servo = motors.get(name) or spec.add_actuator(name=name, target=name)
+        servo.trntype, servo.gear, servo.ctrllimited, servo.forcelimited = mujoco.mjtTrn.mjTRN_JOINT, np.eye(6)[0], 0, 0
+        servo.dyntype, servo.actlimited = mujoco.mjtDyn.mjDYN_NONE, 0
+        servo.set_to_position(kp=stiffness, kv=max(0.0, 2 * np.sqrt(stiffness * inertia) - damping))
+    return spec.compile(), accelerations
+
+
+def _effort(model: mujoco.MjModel, actuator: int) -> float:
+    """Largest force (N) or torque (N m) of a motor on its joint, 0 if it is not limited."""
+    gear, forces = abs(model.actuator_gear[actuator, 0]), list[float]()
+    if model.actuator_ctrllimited[actuator] and model.actuator_gaintype[actuator] == mujoco.mjtGain.mjGAIN_FIXED:
+        forces.append(np.abs(model.actuator_ctrlrange[actuator] * model.actuator_gainprm[actuator, 0]).max())
+    if model.actuator_forcelimited[actuator]:
+        forces.append(np.abs(model.actuator_forcerange[actuator]).max())
+    return float(gear * min(forces, default=0.0))
+
+
+def _burdens(model: mujoco.MjModel, chosen: Sequence[int]) -> tuple[Array, Array]:
+    """``(nv,)`` greatest inertia of each degree of freedom, and greatest load that is not compensated, friction too."""
+    data, inertias, loads = mujoco.MjData(model), np.zeros(model.nv), np.zeros(model.nv)
+    for posture in range(_POSTURES):
+        shares = stream(0, "postures", posture).random(model.njnt)
+        for k in chosen:
+            low, high = model.jnt_range[k] if model.jnt_limited[k] else (-np.pi, np.pi)
+            data.qpos[model.jnt_qposadr[k]] = low + shares[k] * (high - low)
+        mujoco.mj_forward(model, data)
+        loads = np.maximum(loads, np.abs(data.qfrc_bias - data.qfrc_gravcomp - data.qfrc_spring))
+        for dof, unit in enumerate(np.eye(model.nv)):
+            product = np.empty(model.nv)
+            mujoco.mj_mulM(model, data, product, unit)
+            inertias[dof] = max(inertias[dof], product[dof])
+    return inertias, loads + model.dof_frictionloss

@@ -1,0 +1,138 @@
+"""Model files that nobody made for this library: where movements begin, what the servos do, what a user is told."""
+
+import re
+
+import mujoco
+import numpy as np
+import pytest
+
+from sgimd_torch import MujocoRobot, check_environment, stream
+from sgimd_torch.environments.models.posture import NEAR, nearest_posture
+
+# Two links of .3 m under gravity, with motors; the second one begins outside its range, and carries a pole that swings.
+ARM = """<mujoco><option timestep=".004"/>
+  <worldbody><body name="base"><geom size=".03"/><site name="root"/>
+    <body name="upper arm"><joint name="r:1" axis="0 1 0" range="-150 150"/>
+      <geom type="capsule" fromto="0 0 0 .3 0 0" size=".02"/>
+      <body name="fore" pos=".3 0 0"><joint name="r:2" axis="0 1 0" range="20 150"/>
+        <geom type="capsule" fromto="0 0 0 .3 0 0" size=".02"/><site name="r:tip:x" pos=".3 0 0"/>
+        <body name="pole" pos=".3 0 0"><joint name="swing" axis="0 1 0" damping=".01"/>
+          <geom size=".01" pos="0 0 -.05" contype="0" conaffinity="0"/></body></body></body></body></worldbody>
+  <actuator><motor joint="r:1" ctrlrange="-20 20"/><motor joint="r:2" ctrlrange="-10 10"/></actuator></mujoco>"""
+PULLED = """<mujoco><worldbody>
+    <body name="cart"><joint name="x" type="slide" axis="1 0 0" range="-1 1"/><geom size=".1"/>
+    <site name="hand"/><body name="claw"><joint name="grip" range="0 1"/><geom size=".02" pos=".2 0 0"/></body></body>
+    <body name="puller" mocap="true"/></worldbody>
+  <equality><weld body1="puller" body2="cart"/></equality>
+  <actuator><position joint="grip" kp="5"/></actuator></mujoco>"""
+LINK = (
+    '<link name="{}"><inertial><origin xyz=".1 0 0"/><mass value="1"/>'
+    '<inertia ixx=".01" iyy=".01" izz=".01" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+)
+URDF = (
+    '<robot name="arm"><link name="base"/>'
+    + LINK.format("upper")
+    + '<joint name="turn" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/>'
+    '<limit lower="-1" upper="1" effort="30" velocity="5"/></joint></robot>'
+)
+LOST = (
+    '<link name="x"><collision><geometry><mesh filename="package://lost/a.stl"/></geometry></collision></link>'
+    '<joint name="y" type="fixed"><parent link="upper"/><child link="x"/></joint></robot>'
+)
+KEY = '<keyframe><key name="Home" qpos=".3 .7 0"/></keyframe>'
+NONE = np.zeros(0)
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    pieces = ("arm.xml", ARM), ("arm.urdf", URDF), ("pulled.xml", PULLED), ("arm.sdf", "<sdf/>")
+    for name, text in pieces:
+        (tmp_path / name).write_text(text)
+    return tmp_path
+
+
+def test_an_arm_with_motors_begins_within_its_ranges_holds_still_and_goes_where_it_is_told(here):
+    robot = MujocoRobot("arm.xml", outcome="joint:r:1,joint:r:2", low=(-3, -3), high=(3, 3), durations=(0.5, 1.0))
+    assert robot.start == pytest.approx([0, np.deg2rad(20)])
+    assert robot.joints == robot.primitive.joints.names == ("r:1", "r:2")
+    assert robot.rest == pytest.approx(robot.start, abs=0.01)
+    theta = robot.policies.sample(stream(0, "theta"))
+    commands = robot.primitive.at(theta, np.array([0.0, 100.0]))
+    assert commands[0] == pytest.approx(robot.start)
+    assert robot.execute(NONE, theta, stream(0, "x")) == pytest.approx(commands[1], abs=0.05)
+    said = "\n".join(robot.remarks)
+    for words in ("motors that are no servos: position servos were made for r:1, r:2", "r:2 outside the range",
+                  "without an actuator, so they move freely: swing", "equal parts of T"):  # fmt: skip
+        assert words in said
+    check_environment(robot)
+    kept = MujocoRobot("arm.xml", outcome="joint:r:1,joint:r:2", durations=(0.5, 1.0), **robot.found_options)
+    assert kept.execute(NONE, theta, stream(0, "x")).tolist() == robot.execute(NONE, theta, stream(0, "x")).tolist()
+
+
+def test_the_motors_of_the_file_let_it_fall_and_a_remark_says_so(here):
+    robot = MujocoRobot("arm.xml", outcome="site:r:tip:x:xz", servos="file", low=(-1, -1), high=(1, 1))
+    assert robot.joints == ()
+    assert any("holding still, what is measured moves by" in remark for remark in robot.remarks)
+
+
+def test_a_keyframe_named_home_is_the_start(here):
+    (here / "arm.xml").write_text(
+        ARM.replace("<actuator>", '<keyframe><key name="Home" qpos=".3 .7 0"/></keyframe><actuator>')
+    )
+    robot = MujocoRobot("arm.xml", outcome="site:r:tip:x:xz", low=(-1, -1), high=(1, 1))
+    assert robot.start == pytest.approx([0.3, 0.7])
+
+
+def test_no_movement_exceeds_the_speeds_of_a_urdf(here):
+    robot = MujocoRobot("arm.urdf", outcome="joint:turn", low=(-1,), high=(1,), durations=(0.05, 0.1))
+    times, commands = robot.primitive.trajectory(np.array([0, 1, 0, 1, 0.0]), rate=500)
+    speeds = np.abs(np.diff(commands, axis=0)).max(axis=0) / np.diff(times)[0]
+    assert (speeds < 5.01).all()
+    assert speeds.max() > 2
+
+
+def test_links_that_touch_are_moved_apart_by_the_shortest_way():
+    balls = "".join(
+        f'<body pos="{x} 0 0"><joint type="slide" axis="1 0 0"/><geom size=".05"/></body>' for x in (0, 0.06)
+    )
+    model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{balls}</worldbody></mujoco>")
+    found = nearest_posture(model, np.zeros(2), [0, 1], [1, 2])
+    assert found == pytest.approx([-0.02 - NEAR / 2, 0.02 + NEAR / 2], abs=1e-3)
+
+
+def test_an_arm_that_a_mocap_body_pulls_is_moved_by_its_joints_if_asked_for(here):
+    robot = MujocoRobot("pulled.xml", outcome="site:hand:x", servos="made", low=(-1,), high=(1,))
+    assert robot.joints == ("grip", "x")
+    ended = robot.execute(NONE, np.array([0.5] * 4 + [0.9] * 4 + [1.0]), stream(0, "x"))
+    assert ended == pytest.approx([0.8], abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"outcome": "site:root"}, "no joint moves it, is it on the base? A place of the arm is site:r:tip:x"),
+        ({"outcome": "site:r:tup:x"}, "the model has no site 'r:tup'; did you mean r:tip:x?"),
+        ({"joints": ("r:1", "r:1")}, "joints names 'r:1' 2 times"),
+        ({"model": "pulled.xml", "outcome": "site:hand:x"}, "a mocap body holds cart; --environment.servos made moves"),
+        ({"model": "arm.sdf"}, "arm.sdf is an SDF file; MuJoCo reads MJCF and URDF"),
+        ({"servos": "mad"}, "unknown servos 'mad'; did you mean made?"),
+        ({"posture": (0.0,)}, "posture must have shape (..., 3)"),
+    ],
+)  # fmt: skip
+def test_a_slip_is_told_with_its_cause(here, options, said):
+    with pytest.raises(ValueError, match=re.escape(said)):
+        MujocoRobot(**{"model": "arm.xml", "outcome": "site:r:tip:x:xz", "low": (-1, -1), "high": (1, 1), **options})
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (('ixx=".01"', 'ixx=".1"'), 'write <mujoco><compiler balanceinertia="true"/></mujoco> into arm.urdf'),
+        (("</robot>", LOST), "put the folder lost there"),
+    ],
+)
+def test_what_mujoco_refuses_in_a_urdf_is_told_with_where_to_write_the_cure(here, change, said):
+    (here / "arm.urdf").write_text(URDF.replace(*change))
+    with pytest.raises(ValueError, match=re.escape(said)):
+        MujocoRobot("arm.urdf", outcome="body:upper:xz")
