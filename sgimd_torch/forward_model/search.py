@@ -1,6 +1,6 @@
-"""A search by the gradient of the forward model, towards reliable movements that land nearer to the goal.
+"""Searches by the gradient of the forward model, towards reliable movements that land nearer to the goal.
 
-Not in Nguyen & Oudeyer (2014); an alternative to the simplex of section 4.4.2, which needs no model.
+Not in Nguyen & Oudeyer (2014); alternatives to the simplex of section 4.4.2, which needs no model.
     search = GradientSearch(problem); movements = search(estimate, goal); theta = next(movements)
 """
 
@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Generator
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import torch
 
 from sgimd_torch.forward_model.anchored import Anchored
 from sgimd_torch.forward_model.shared import model_of, uses_model
+from sgimd_torch.options.signature import with_keywords_of
 from sgimd_torch.parts import Problem, Search
 from sgimd_torch.searches.simplex import NelderMead
 from sgimd_torch.spaces import Array, Estimate
@@ -50,9 +51,14 @@ class GradientSearch(Search):
             raise ValueError(f"noise must lie in [0, 0.5], got {noise}; it is a fraction of the sides of Pi")
         self.model, self.noise, self._simplex = model_of(problem), noise, NelderMead(problem)
 
+    @property
+    def by_model(self) -> bool:
+        """Whether the next search is by the model; false: the model is not trusted."""
+        return uses_model(self.problem.inverse, self.model)
+
     def __call__(self, start: Estimate, goal: Array) -> Generator[Array, Array, None]:
         """Movements near ``start``; each depends on the outcomes of earlier ones."""
-        if not uses_model(self.problem.inverse, self.model):
+        if not self.by_model:
             yield from self._simplex(start, goal)
             return
         self.model.guides, policies = True, self.problem.policies
@@ -75,3 +81,26 @@ class GradientSearch(Search):
             elif misfit > change:
                 radius = max(radius / 2, _LEAST_RADIUS)
             thetas, outcomes, first = np.vstack([thetas, theta]), np.vstack([outcomes, outcome]), first[:0]
+
+
+class GradientThenNelderMead(Search):
+    """Nelder-Mead simplex that begins at the answer of the gradient search (extra forward).
+
+    The answer is the result of the first descent, which costs no movement. The simplex executes it as its first vertex.
+    Until the model is trusted, the simplex begins at theta_g.
+
+    Args:
+        problem: problem to learn.
+        options: options of `NelderMead`.
+    """
+
+    @with_keywords_of(NelderMead)
+    def __init__(self, problem: Problem, **options: Any) -> None:
+        super().__init__(problem)
+        self.gradient, self.simplex = GradientSearch(problem, noise=0.0), NelderMead(problem, **options)
+
+    def __call__(self, start: Estimate, goal: Array) -> Generator[Array, Array, None]:
+        """Movements around the answer."""
+        if self.gradient.by_model:
+            start = start._replace(theta=next(self.gradient(start, goal)))
+        yield from self.simplex(start, goal)

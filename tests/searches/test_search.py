@@ -123,9 +123,9 @@ def test_an_incomplete_simplex_stays_in_the_flat_of_its_vertices_and_still_meets
     assert min(world.distance(theta) for theta in executed) < 1e-3
 
 
-@pytest.fixture(params=[word for word in WORDS["search"] if word != "gradient"])  # it needs a forward model
+@pytest.fixture(params=WORDS["search"])
 def make(request):
-    """Every search, as wide as it can be."""
+    """Every search, as wide as it can be; those through a forward model before it is trusted."""
     search = part("search", request.param)
     return partial(search, **dict.fromkeys({"noise", "step", "sd"} & options_of(search).keys(), 0.5))
 
