@@ -26,10 +26,9 @@ from numpy.typing import ArrayLike
 
 from lives import make_lives, parser
 from sgimd_torch.algorithms.paper import random_exploration, sagg_riac
-from sgimd_torch.algorithms.practice import PRACTICE, practice
+from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.goals.uniform import UniformGoals
-from sgimd_torch.inverses.among_effects import AmongEffects
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.learner import Learner
@@ -47,10 +46,9 @@ UNSEEN: Final = range(320, 380)  # robots of the page ANY_ROBOT, named before th
 TABLE: Final = "random.csv"
 RANDOM: Final = "random"  # reference: random movements
 BASELINE: Final = "uniform-nearest"  # reference: the standard baseline
-NARROW: Final = {**PRACTICE, "explore": partial(Returning, first=0)}
 LEARNERS: Final[Mapping[str, Callable[[RandomRobot, int], Learner]]] = {
     "practice": practice,
-    "practice-middle": partial(sagg_riac, inverse=AmongEffects, **NARROW),
+    "practice-middle": partial(practice, explore=partial(Returning, uniform=0.0)),
     "practice-interest": partial(practice, goals=InterestMap),
     "sagg-riac": sagg_riac,
     BASELINE: partial(sagg_riac, goals=UniformGoals, inverse=NearestNeighbour, search=Perturb, budget=1),

@@ -52,16 +52,8 @@ MANY: Final = Path("many.npz")  # file of the first demonstrations
 MADE: Final = (CORNER, MANY)  # files that ``make_subsets`` writes
 ONCE: Final[Variant] = {"teacher": "initial", "teacher.every": 1}  # at the start, one demonstration a movement
 PRACTICE: Final[Variant] = {"algorithm": "practice"}
-WIDE: Final[Variant] = {  # the wide family of practice alone
-    **SAGG_RIAC,
-    "inverse": "among-effects",
-    "goals": "within-reach",
-    "search": "vary",
-    "explore": "returning",
-    "budget": 1,
-    "global_range": (0.02, 0.3),
-}
-NARROW: Final[Variant] = {**WIDE, "explore.first": 0}  # one family that begins around the middle of Pi
+WIDE: Final[Variant] = {**PRACTICE, "explore.uniform": 1.0}  # global movements are uniform
+NARROW: Final[Variant] = {**PRACTICE, "explore.uniform": 0.0}  # global movements spread from the middle of Pi
 TAUGHT: Final[Variant] = {"algorithm": "practice-taught", **ONCE}
 UNTAUGHT: Final[dict[str, Variant]] = {
     "random": {"algorithm": "random"},
@@ -70,7 +62,7 @@ UNTAUGHT: Final[dict[str, Variant]] = {
     "cma-mae": {"algorithm": "cma-mae"},
 }
 # Steps from the standard baseline to `practice`.
-MIDDLE: Final[Variant] = {**REFERENCES[UNIFORM], "explore": "widening", "global_range": (0.02, 0.3)}
+MIDDLE: Final[Variant] = {**REFERENCES[UNIFORM], "explore": "returning", "global_range": (0.05, 0.05)}
 # SGIM-D with a forward model that answers once it predicts as well as `process`, and with one that answers untested.
 MODEL: Final[dict[str, Variant]] = {
     "sgim-d-model": {**SGIM_D, "inverse": "model", "search": "gradient"},

@@ -12,7 +12,7 @@ Modules for each section of the paper:
     4.4    goal-directed policy optimisation               strategies, explore, inverses (eqs. 8, 9), searches
     5.2    evaluation                                      evaluation (eq. 10)
     5.3    demonstrations and teachers                     demonstrations, teachers
-    -      practice, our default learner                   algorithms.practice, algorithms.families, explore
+    -      practice, our default learner                   algorithms.practice
     -      asking teachers: SGIM-IM, SGIM-ACTS             asking
     -      a forward model, our addition                   forward_model
     -      robots of gymnasium; our robots in gymnasium    environments.from_gymnasium, environments.to_gymnasium

@@ -1,9 +1,10 @@
-"""Goals within reach: uniform in a box around the reached outcomes, or in T if T is hardly larger.
+"""Goals within reach: of a few goals near the reached outcomes, the one with the least sure answer.
 
-Our addition. If T is far larger than the reachable part, nearly all uniform goals are out of reach, and a learner that
-aims at them learns only its most extreme movements. The box holds outcomes that can be reached again: each movement
-counts with the mean outcome of similar movements, so lucky outcomes hardly matter. Goals also lie within a step outside
-the box, so that the box can grow. The step is wide at first, and narrows if goals outside the box are missed.
+Our addition. It is active learning by uncertainty (Lewis & Gale 1994). If T is far larger than the reachable part,
+nearly all goals of T are out of reach, and a learner that aims at them learns only its most extreme movements. So goals
+lie in a box of outcomes that can be reached again: each movement counts with the mean outcome of similar movements, so
+lucky outcomes hardly matter. Goals also lie within a step outside the box, so that the box can grow. The step is wide
+at first, and narrows if goals outside the box are missed. If T is hardly larger than the box, goals lie in T.
     goals = WithinReach(problem); goal = goals.sample(context)
 """
 
@@ -17,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from sgimd_torch.goals.uniform import UniformGoals
 from sgimd_torch.parts import Problem
-from sgimd_torch.spaces import Array
+from sgimd_torch.spaces import Array, check_count
 
 _FEWEST: Final = 21  # least number of exemplars that determine a box; with fewer, goals are uniform in T
 _SAMPLED: Final = 1000  # largest number of exemplars from which the box is computed
@@ -36,7 +37,7 @@ _ALL_OF_T: Final = 0.7  # geometric mean of the box's sides, relative to T's, fr
 
 
 class WithinReach(UniformGoals):
-    """Uniform goals in a box around the outcomes that were reached.
+    """Goals in a box around the outcomes that were reached, where the inverse model is least sure of its answer.
 
     The step outside the box has one width on all sides, in the unit of T. So goals also lie in directions in which
     outcomes have not varied yet. The width follows a success rule (Rechenberg 1973), by which one of four goals outside
@@ -45,11 +46,19 @@ class WithinReach(UniformGoals):
     uniform in T, because a few effects do not show what can be reached.
 
     Args:
-        problem: problem to learn.
+        problem: problem to learn. If its inverse model does not say how sure it is, the first candidate is the goal.
+        candidates: number of uniform goals of which the one with the least sure answer is chosen; 1: goals are uniform.
+
+    Raises:
+        ValueError: ``candidates`` is no count.
     """
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, *, candidates: int = 2) -> None:
         super().__init__(problem)
+        self.candidates = check_count("candidates", candidates, 1)
+        inverse = type(problem.inverse)
+        if candidates > 1 and not inverse.says_how_sure:
+            problem.remarks.append(f"goals are uniform within reach: {inverse.__name__} does not say how sure it is")
         self._box: Array | None = None  # (2, outcome_dim), the box; None while all outcomes are equal
         self._step = _WIDEST  # width of the step outside the box, relative to the box's longest side
         self._n_updated = 0  # number of exemplars when the box was computed
@@ -57,11 +66,19 @@ class WithinReach(UniformGoals):
         self._all_of_t = False  # whether T is hardly larger than the box with its widest step
 
     def sample(self, context: ArrayLike) -> Array:
-        """A goal ``(outcome_dim,)``, uniform in T, or in the box that is widened by the step.
+        """A goal ``(outcome_dim,)`` in T, or in the box that is widened by the step.
 
         Raises:
             ValueError: ``context`` is not one point of C.
         """
+        goal, inverse = self._within_reach(context), self.problem.inverse
+        if self.candidates == 1 or not inverse.says_how_sure or inverse.effects() is not None or not self._n_updated:
+            return goal
+        goals = [goal, *(self._within_reach(context) for _ in range(self.candidates - 1))]
+        return max(goals, key=lambda goal: inverse(np.asarray(context, dtype=np.float64), goal).sd or 0.0)
+
+    def _within_reach(self, context: ArrayLike) -> Array:
+        """A goal ``(outcome_dim,)``, uniform in T, or in the box that is widened by the step."""
         goal, space = super().sample(context), self.problem.outcomes
         n = len(self.problem.memory)
         if n >= max(_FEWEST, _GROWTH * self._n_updated):

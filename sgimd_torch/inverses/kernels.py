@@ -19,7 +19,12 @@ from sgimd_torch.spaces import Array
 STEPS: Final = 4  # largest number of Gauss-Newton steps from each start
 STARTS: Final = 3  # number of exemplars where steps begin
 DAMPINGS: Final = (1e-3, 0.1, 1.0, 10.0)  # all tried in each step, relative to the mean diagonal of J J^T
-CLEARLY: Final = 0.8  # error, relative to that of the nearest exemplar, below which a candidate is clearly better
+GROSS: Final = 9.0  # squared residual, relative to the usual one, from which on an exemplar is a gross error
+DETERMINED: Final = (
+    0.5  # variance of an outcome given all others, relative to the kernel's, below which they contradict it
+)
+OUTLIERS: Final = 8  # largest number of gross errors among the exemplars of a process
+USUAL: Final = 4.0  # largest squared residual that counts in full when the usual one is computed
 TINY: Final = 1e-300  # guard against 0 where a number is divided or its logarithm is taken
 ROOT5: Final = float(np.sqrt(5))
 LOG2: Final = math.log(2)
@@ -36,6 +41,7 @@ class GaussianProcess(NamedTuple):
         kernel: ``(4,)``: scale, which multiplies all inputs; finer, how much shorter the length of a second Matern is;
             share, weight of the second Matern; noise, variance relative to the kernel's.
         factor: ``(n, n)`` Cholesky factor of the covariance of the movements.
+        noises: ``(n,)``, variance of the noise of each movement, relative to the kernel's.
         weights: ``(outcome_dim, n)``, inverse covariance times outcomes.
         mean: ``(outcome_dim,)``, mean outcome.
         variance: most likely variance, by which the kernel is multiplied.
@@ -44,6 +50,7 @@ class GaussianProcess(NamedTuple):
     inputs: Array
     kernel: Array
     factor: Array
+    noises: Array
     weights: Array
     mean: Array
     variance: float
@@ -120,12 +127,38 @@ def solve_transposed(lower: Array, b: Array) -> None:
 
 @jit_helper
 def fitted_process(inputs: Array, outcomes: Array, kernel: Array) -> GaussianProcess:
-    """The process of movements with ``inputs`` ``(dim, n)`` and ``outcomes`` ``(outcome_dim, n)``."""
-    m, n = outcomes.shape
+    """The process of movements with ``inputs`` ``(dim, n)`` and ``outcomes`` ``(outcome_dim, n)``.
+
+    The movement that all others contradict most gets the noise that explains it, then the next one, until none is
+    contradicted. So gross errors, such as those of a camera that loses the object, hardly count. A movement far from
+    all others is contradicted by none."""
+    n = outcomes.shape[1]
     covariance, _ = covariance_matrix(inputs, kernel)
+    noises = np.full(n, kernel[3])
+    process = process_with(inputs, outcomes, kernel, covariance, noises)
+    for _ in range(OUTLIERS):
+        precision = precisions(process.factor, n)
+        largest, outlier, usual = 0.0, 0, 0.0
+        for j in range(n):
+            residual = squared_residual(process, j, precision[j])
+            usual += min(residual, USUAL) / n
+            if residual > largest and 1 / precision[j] < DETERMINED:
+                largest, outlier = residual, j
+        if largest < GROSS * max(1.0, usual):
+            break
+        noises[outlier] += (largest - 1) / precision[outlier]
+        process = process_with(inputs, outcomes, kernel, covariance, noises)
+    return process
+
+
+@jit_helper
+def process_with(inputs: Array, outcomes: Array, kernel: Array, covariance: Array, noises: Array) -> GaussianProcess:
+    """The process of movements with this ``covariance`` ``(n, n)``, the lower half alone, and these ``noises``."""
+    m, n = outcomes.shape
+    noisy = covariance.copy()
     for i in range(n):
-        covariance[i, i] += kernel[3]
-    factor = np.ascontiguousarray(np.linalg.cholesky(covariance))
+        noisy[i, i] += noises[i]
+    factor = np.ascontiguousarray(np.linalg.cholesky(noisy))
     weights, mean, total = np.empty((m, n)), np.empty(m), 0.0
     for k in range(m):
         mean[k] = outcomes[k].sum() / n
@@ -133,18 +166,33 @@ def fitted_process(inputs: Array, outcomes: Array, kernel: Array) -> GaussianPro
         solve_lower(factor, weights[k])
         total += weights[k] @ weights[k]
         solve_transposed(factor, weights[k])
-    return GaussianProcess(inputs, kernel, factor, weights, mean, max(total / (n * m), TINY))
+    return GaussianProcess(inputs, kernel, factor, noises.copy(), weights, mean, max(total / (n * m), TINY))
 
 
 @jit_helper
 def precisions(factor: Array, n_last: int) -> Array:
     """Diagonal of the inverse covariance for the last movements; only the last corner of the factor is needed."""
-    first = len(factor) - n_last
-    root, diagonal = np.linalg.inv(factor[first:, first:].copy()), np.zeros(n_last)
-    for j in range(n_last):
-        for i in range(j, n_last):
+    first, root, diagonal = len(factor) - n_last, np.zeros((n_last, n_last)), np.zeros(n_last)
+    for i in range(n_last):  # row i of the inverse factor
+        for k in range(i):
+            for j in range(k + 1):
+                root[i, j] -= factor[first + i, first + k] * root[k, j]
+        for j in range(i):
+            root[i, j] /= factor[first + i, first + i]
+        root[i, i] = 1 / factor[first + i, first + i]
+        for j in range(i + 1):
             diagonal[j] += root[i, j] ** 2
     return diagonal
+
+
+@jit_helper
+def squared_residual(process: GaussianProcess, j: int, precision: float) -> float:
+    """Squared error of predicting movement ``j`` from all others, divided by the expected one, eq. (5.12) of Rasmussen
+    & Williams."""
+    total = 0.0
+    for k in range(len(process.weights)):
+        total += process.weights[k, j] ** 2
+    return total / precision / (len(process.weights) * process.variance)
 
 
 @jit_helper
@@ -259,8 +307,9 @@ def answer(
     spreads: Array,
     box: Array,
 ) -> tuple[Array, Array, float]:
-    """theta of the candidate with the least expected squared error, or of the nearest exemplar if none is a fifth
-    better. Also its expected outcome, and the standard deviation from that, noise included.
+    """theta of the candidate with the least expected squared error, its expected outcome, and the standard deviation
+    from that, noise included. Candidates are the exemplars near the goal, the ends of steps from three of them, and the
+    answer of `LocallyLinear`.
 
     Args:
         near: ``(n_near,)`` rows of the nearest outcomes, nearest first.
@@ -274,30 +323,25 @@ def answer(
         spreads: ``(theta_dim,)``, standard deviation of each parameter in memory, the unit of the steps.
         box: ``(2, theta_dim)``, corners of the box around all thetas.
     """
-    rows, m, noise = rows_to_fit(near, alike, len(thetas)), len(goal), kernel[3]
+    rows, m = rows_to_fit(near, alike, len(thetas)), len(goal)
     first = len(rows) - len(near)
     process = fitted_process(as_columns(inputs, rows), as_columns(outcomes, rows), kernel)
     precision = precisions(process.factor, len(near))
-    # The mean squared error of predicting each exemplar from all others, divided by the expected one.
-    surprise = 0.0
+    surprise = 0.0  # mean squared residual near the goal
     for j in range(len(near)):
-        for k in range(m):
-            surprise += process.weights[k, first + j] ** 2 / precision[j] / (len(near) * m * process.variance)
-    # Two corrections inflate the variance: one for surprising exemplars here, and one because a process with many
-    # lengths, fitted while the memory is small, errs most at the candidates that look best.
-    inflation = m * max(1.0, surprise) * (1 + scaling.shape[1] ** 2 / len(thetas))
+        surprise += squared_residual(process, first + j, precision[j]) / len(near)
+    inflation = m * max(1.0, surprise)
     covariance, slope = np.empty(len(rows)), np.empty(len(rows))
-    least, nearest_error, best = np.inf, np.inf, linear
+    least, best = np.inf, linear
     for j in range(len(near)):
         if len(context):
             covariances(process.inputs, kernel, in_lengths(thetas[near[j]], context, scaling), covariance, slope)
             error = expected_error(process, goal, inflation, covariance, least)
         else:  # posterior of its outcome without noise, given itself and all others
+            noise = process.noises[first + j]
             error = inflation * process.variance * noise * max(1 - noise * precision[j], 0.0)
             for k in range(m):
                 error += (outcomes[near[j], k] - noise * process.weights[k, first + j] - goal[k]) ** 2
-        if j == 0:
-            nearest_error = error
         if error < least:
             least, best = error, thetas[near[j]]
     covariances(process.inputs, kernel, in_lengths(linear, context, scaling), covariance, slope)
@@ -308,9 +352,9 @@ def answer(
         error, theta = descend(process, thetas[row], context, goal, inflation, scaling, spreads, box)
         if error < least:
             least, best = error, theta
-    best = best.copy() if least < CLEARLY * nearest_error else thetas[near[0]].copy()
+    best = best.copy()
     outcome, variance = prediction(process, in_lengths(best, context, scaling))
-    return best, outcome, np.sqrt(max(1.0, surprise) * (variance + process.variance * noise))
+    return best, outcome, np.sqrt(max(1.0, surprise) * (variance + process.variance * kernel[3]))
 
 
 @compiled_for(TABLE, TABLE, ROWS, NUMBERS, NUMBERS)

@@ -1,9 +1,9 @@
-"""Local Gaussian process as inverse model; the answer is the nearest exemplar, unless the process is clearly better.
+"""Local Gaussian process as inverse model; the answer is the candidate with the least expected error.
 
 Our addition, not in the paper. The process is fitted to movements near the goal and to movements like them. Candidates
-are the ends of Gauss-Newton steps from the nearest exemplars, and the answer of `LocallyLinear`. Each candidate has an
-expected squared error, variance included. Where the process predicted exemplars near the goal badly, its variance is
-inflated. If no candidate is clearly better, the answer is the nearest exemplar.
+are the exemplars near the goal, the ends of Gauss-Newton steps from them, and the answer of `LocallyLinear`. Each
+candidate has an expected squared error, variance included. Where the process predicted exemplars near the goal badly,
+its variance is inflated.
     inverse = LocalProcess(problem); estimate = inverse(context, goal)
 """
 
@@ -41,7 +41,7 @@ class FittedKernel(NamedTuple):
 
 
 class LocalProcess(Inverse):
-    """Local Gaussian process; the nearest exemplar, unless the process is clearly better.
+    """Local Gaussian process; the answer has the least expected error, and may be a remembered movement.
 
     The answer depends on the memory alone. Lengths and kernel are refitted when the memory has 1.5 times its size at
     the last fit; other calls use neighbours only. Units do not matter. The answer is clipped to the box around all
@@ -57,11 +57,20 @@ class LocalProcess(Inverse):
         self._linear = LocallyLinear(problem)
         self._due = float(_FIRST)  # exemplars at the next fit
         self._kernel: Array | None = None  # a `Kernel`; None while all outcomes are equal
+        self._answered: tuple[int, dict[bytes, Estimate]] = 0, {}  # answers by context and goal, at this many exemplars
 
     def __call__(self, context: Array, goal: Array) -> Estimate:
-        """The answer, and the exemplars of the nearest outcomes, nearest first."""
-        memory = self.memory
+        """The answer, and the exemplars of the nearest outcomes, nearest first. A goal model may have asked before."""
         context, goal = (np.ascontiguousarray(point, dtype=np.float64) for point in (context, goal))
+        if self._answered[0] != len(self.memory):
+            self._answered = len(self.memory), {}
+        answered, question = self._answered[1], context.tobytes() + goal.tobytes()
+        if question not in answered:
+            answered[question] = self._answer(context, goal)
+        return answered[question]
+
+    def _answer(self, context: Array, goal: Array) -> Estimate:
+        memory = self.memory
         self._catch_up()
         near = near_goal(memory, context, goal, _NEAR)
         thetas = memory.thetas[near]

@@ -41,7 +41,7 @@ search       searches.simplex           nelder-mead=NelderMead
 search       searches.perturb           perturb=Perturb vary=Vary
 search       rivals.cma_es              cma-es=CmaEs
 search       forward_model.search       gradient=GradientSearch gradient-then-nelder-mead=GradientThenNelderMead
-explore      searches.explore           anywhere=Anywhere widening=Widening returning=Returning
+explore      searches.explore           anywhere=Anywhere returning=Returning
 inverse      inverses.locally_linear    linear=LocallyLinear
 inverse      inverses.local             paper=LocalInverse
 inverse      inverses.nearest           nearest=NearestNeighbour

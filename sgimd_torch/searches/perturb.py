@@ -11,7 +11,6 @@ from collections.abc import Generator
 import numpy as np
 
 from sgimd_torch.parts import Problem, Search
-from sgimd_torch.searches.explore import Width
 from sgimd_torch.spaces import Array, Estimate
 
 
@@ -55,7 +54,7 @@ class Vary(Search):
     """Answer of the inverse model plus a little Gaussian noise.
 
     All movements vary theta_g; their outcomes do not change the search. Movements are clipped to Pi; the search never
-    ends. If theta_g is a copy of a remembered theta, the standard deviation is half of the `Width` of exploration.
+    ends.
 
     The search is meant for an accurate inverse model and for one or two movements at each goal. The outcomes correct
     the inverse model, and show how the outcome changes with theta.
@@ -68,17 +67,16 @@ class Vary(Search):
         ValueError: ``sd`` is not positive.
     """
 
-    def __init__(self, problem: Problem, *, sd: float = 0.02) -> None:
+    def __init__(self, problem: Problem, *, sd: float = 0.03) -> None:
         super().__init__(problem)
-        self.sd, self.width = _positive(sd), problem.shared(Width, Width)
+        self.sd = _positive(sd)
 
     def __call__(self, start: Estimate, goal: Array) -> Generator[Array, Array, None]:
         """Movements around theta_g of ``start``."""
         policies = self.problem.policies
         theta = policies.check("theta of the estimate", start.theta)
         while True:
-            sd = self.width.sd / 2 if _remembered(start) else self.sd
-            yield policies.clip(self.rng.normal(theta, sd * policies.sides))
+            yield policies.clip(self.rng.normal(theta, self.sd * policies.sides))
 
 
 def _remembered(start: Estimate) -> bool:

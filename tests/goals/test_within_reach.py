@@ -5,6 +5,7 @@ import pytest
 
 from sgimd_torch.goals.uniform import UniformGoals
 from sgimd_torch.goals.within_reach import WithinReach
+from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.spaces import Box
 from worlds import NO_CONTEXT, problem, remember
@@ -116,3 +117,18 @@ def test_in_a_unit_a_thousand_times_smaller_goals_are_a_thousand_times_as_large(
     metres = drawn(remembering(outcomes), space)
     millimetres = drawn(remembering(1000 * outcomes), Box.cube(-50_000, 50_000, 3))
     np.testing.assert_allclose(millimetres, 1000 * metres, rtol=1e-9)
+
+
+def test_of_more_candidates_the_goal_is_the_one_with_the_less_sure_answer():
+    thetas = np.random.default_rng(0).uniform(-1, 1, (120, 2))
+    thetas[:100, 0] = np.abs(thetas[:100, 0])  # on one side movements are rare
+    memory, shares, sure = remembering(thetas, thetas=thetas), [], []
+    for candidates in (1, 2, 5):
+        given = problem(outcomes=Box.cube(-1, 1, 2), memory=memory, inverse=LocalProcess)
+        goals = WithinReach(given, candidates=candidates)
+        drawn = np.array([goals.sample(NO_CONTEXT) for _ in range(200)])
+        shares.append((drawn[:, 0] < 0).mean())
+        sure.append(np.mean([given.inverse(NO_CONTEXT, goal).sd for goal in drawn]))
+    assert shares[0] == pytest.approx(0.5, abs=0.11)  # three standard errors
+    assert sure == sorted(sure)
+    assert shares == sorted(shares)

@@ -162,7 +162,7 @@ def test_where_nothing_can_be_predicted_the_nearest_exemplar_answers() -> None:
     same = [
         np.array_equal(inverse(NO_CONTEXT, g).theta, nearest(NO_CONTEXT, g).theta) for g in rng.normal(size=(30, 2))
     ]
-    assert np.mean(same) > 0.9
+    assert np.mean(same) > 0.8
 
 
 def test_stated_noise_is_averaged_out() -> None:
@@ -200,19 +200,29 @@ def test_units_do_not_matter() -> None:
 
 
 def in_wind(contexts: Array) -> float:
-    """The mean error of a robot that does not feel the wind that it remembers."""
+    """The median error of a robot that does not feel the wind that it remembers."""
     toy = two_elbows().environment
-    memory, goals = played(toy, 200).memory, played(toy, 20, seed=1).memory.outcomes
+    memory, goals = played(toy, 200).memory, played(toy, 60, seed=1).memory.outcomes
     inverse = LocalProcess(remembering(memory.thetas, memory.outcomes, contexts[:200]))
     thetas = np.stack([estimate.theta for estimate in inverse.answer_many(contexts[200:], goals)])
-    return float(np.linalg.norm(toy.effect(np.zeros((20, 0)), thetas) - goals, axis=1).mean())
+    return float(np.median(np.linalg.norm(toy.effect(np.zeros((60, 0)), thetas) - goals, axis=1)))
 
 
 @pytest.mark.parametrize("value", [0.3, 0.5, 101325.0, 1e9])
 def test_it_does_not_matter_how_far_from_0_an_input_is(value: float) -> None:
-    wind = stream(0, "wind").uniform(-1, 1, size=(220, 1))
-    assert in_wind(value * (1 + 1e-9 * wind)) == pytest.approx(in_wind(wind), rel=0.1)
-    assert in_wind(np.full((220, 1), value)) == pytest.approx(in_wind(np.zeros((220, 0))), rel=0.1)
+    wind = stream(0, "wind").uniform(-1, 1, size=(260, 1))
+    assert in_wind(value * (1 + 1e-9 * wind)) == pytest.approx(in_wind(1e-9 * value * wind), rel=0.1)
+    assert in_wind(np.full((260, 1), value)) == pytest.approx(in_wind(np.zeros((260, 0))), rel=0.1)
+
+
+@pytest.mark.parametrize("rows", [[7], [7, 20, 41]])
+def test_a_gross_error_is_explained_by_noise_and_predictions_hardly_change(rows: list[int]) -> None:
+    (inputs, outcomes), kernel = waves(60), Kernel(1.0, 1.0, 0.0, 1e-4)
+    wrong = outcomes.copy()
+    wrong[rows] += [2.0, -3.0]
+    assert np.flatnonzero(fitted(inputs, wrong, kernel).noises > kernel.noise).tolist() == rows
+    for row in rows:
+        assert predicted(inputs, wrong, kernel, inputs[row])[0] == pytest.approx(outcomes[row], abs=0.2)
 
 
 @pytest.mark.parametrize("far", [25.0, 50.0])

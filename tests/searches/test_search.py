@@ -176,8 +176,8 @@ COPY, INFERRED = (0.3, 5.0), (0.4, 6.0)
         (NelderMead, INFERRED, INFERRED, 0.05),
         (Perturb, COPY, (0.5, 0.0), 0.05),  # around the best remembered
         (partial(Perturb, sd=0.02), COPY, (0.5, 0.0), 0.02),
-        (Vary, INFERRED, INFERRED, 0.02),
-        (Vary, COPY, COPY, 0.05),
+        (Vary, INFERRED, INFERRED, 0.03),
+        (Vary, COPY, COPY, 0.03),
     ],
 )
 def test_what_is_varied_spreads_by_sd_of_each_side(make, theta, mean, sd) -> None:

@@ -11,7 +11,7 @@ from sgimd_torch.options.command_line import main as run_main
 from sgimd_torch.runs.signals import command
 from sgimd_torch.views.ask import main
 
-SHORT = ["--environment=planar-arm-7", "--algorithm=practice", "--seed=4", "--movements=60", "--evaluate-at=[]"]
+SHORT = ["--environment=planar-arm-7", "--algorithm=practice", "--seed=4", "--movements=80", "--evaluate-at=[]"]
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +26,7 @@ def lived():
     """A learner that has made the movements of the run."""
     arm = PlanarArm(7)
     learner = practice(arm, 4)
-    for _ in run(learner, arm, 4, movements=60):
+    for _ in run(learner, arm, 4, movements=80):
         pass
     return learner
 
