@@ -38,7 +38,7 @@ class Problem:
         rest, outcome_noise: outcome of not moving, and standard deviation of outcomes; see `Environment`.
         tolerance: distance in the unit of T at which a goal counts as reached: the outcome noise, but at least .02.
         memory, inverse: exemplars and inverse model of the learner; the inverse model is the first part made.
-        remarks: sentences for the user, for example that exploration does not widen.
+        remarks: sentences for the user, for example that exploration does not look for effects.
         autonomous: autonomous strategy, which is made before the social one.
 
     Raises:

@@ -9,14 +9,13 @@ demonstration of the goal. The goal model is then told the competence at the goa
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from sgimd_torch.algorithms import ThroughBabbling
 from sgimd_torch.asking.interest import AUTONOMOUS, StrategicGoals
-from sgimd_torch.parts import Social
+from sgimd_torch.parts import Part, Social, Strategy
 from sgimd_torch.spaces import Array, AskingAttempt, Request
 from sgimd_torch.strategies import GoalBabbling, recording_outcomes
 
@@ -31,7 +30,7 @@ class Asking(NamedTuple):
     takes: int = 0
 
 
-class StrategicBabbling(ThroughBabbling):
+class StrategicBabbling(Strategy):
     """Goal babbling, or a request to a teacher; the goal model chooses between them by progress and cost.
 
     Args:
@@ -43,7 +42,7 @@ class StrategicBabbling(ThroughBabbling):
     """
 
     def __init__(self, babbling: GoalBabbling, asking: Mapping[str, Asking]) -> None:
-        super().__init__(babbling)
+        super().__init__(babbling.problem)
         if not isinstance(babbling.goals, StrategicGoals):
             raise ValueError(
                 f"goals must be StrategicGoals, which choose strategies, too, got a {type(babbling.goals).__name__}"
@@ -51,7 +50,16 @@ class StrategicBabbling(ThroughBabbling):
         self.costs = {AUTONOMOUS: 1.0, **{name: option.cost for name, option in asking.items()}}
         if not all(0 < cost < np.inf for cost in self.costs.values()):
             raise ValueError(f"costs must be positive and finite, got {self.costs}")
-        self.asking, self.goals = asking, babbling.goals
+        self.babbling, self.asking, self.goals = babbling, asking, babbling.goals
+
+    @property
+    def regions(self) -> Sequence[Any]:
+        """Regions of the goal model."""
+        return self.babbling.regions
+
+    def maker(self, origin: str) -> Part:
+        """See `GoalBabbling.maker`."""
+        return self.babbling.maker(origin)
 
     def attempt(self, context: Array) -> AskingAttempt:
         """Movements by one strategy for one goal; if the teacher has no reply, the movements are autonomous.

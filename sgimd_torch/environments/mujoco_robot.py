@@ -356,18 +356,21 @@ class MujocoRobot:
         mujoco.mj_kinematics(self.model, data)
         return data
 
+    def _held_still(self) -> Array | None:
+        """States of a movement that holds the start, in the middle of C; None if the simulation diverged."""
+        middle = (self.contexts.low + self.contexts.high) / 2
+        return self._simulate(middle[None], [self._still(self._longest)])[0]
+
     def _still_outcome(self, file: str) -> Array:
         """``(outcome_dim,)``, the outcome of a movement that holds the start, in the middle of C."""
-        middle = (self.contexts.low + self.contexts.high) / 2
-        (still,) = self._simulate(middle[None], [self._still(self._longest)])
+        still = self._held_still()
         if still is None:
             raise ValueError(f"{file} diverges even while it holds still; is its timestep too long?")
         return self._outcome(still)
 
     def _look(self) -> list[str]:
         """Sentences on what a user should know before the first movement."""
-        lines, middle = parts(self.model), (self.contexts.low + self.contexts.high) / 2
-        (still,) = self._simulate(middle[None], [self._still(self._longest)])
+        lines, still = parts(self.model), self._held_still()
         if still is not None:
             sunk = float(np.linalg.norm(self._read(still[-1]) - self._read(still[0])))
             mujoco.mj_forward(self.model, data := self._at(still[-1]))

@@ -20,9 +20,7 @@ STEPS: Final = 4  # largest number of Gauss-Newton steps from each start
 STARTS: Final = 3  # number of exemplars where steps begin
 DAMPINGS: Final = (1e-3, 0.1, 1.0, 10.0)  # all tried in each step, relative to the mean diagonal of J J^T
 GROSS: Final = 9.0  # squared residual, relative to the usual one, from which on an exemplar is a gross error
-DETERMINED: Final = (
-    0.5  # variance of an outcome given all others, relative to the kernel's, below which they contradict it
-)
+DETERMINED: Final = 0.5  # variance of an outcome given all others, relative to the kernel's, below which they judge it
 OUTLIERS: Final = 8  # largest number of gross errors among the exemplars of a process
 USUAL: Final = 4.0  # largest squared residual that counts in full when the usual one is computed
 TINY: Final = 1e-300  # guard against 0 where a number is divided or its logarithm is taken

@@ -80,18 +80,18 @@ class Returning(Explore):
     def __call__(self, context: Array) -> Array:
         """The next movement ``(theta_dim,)``."""
         effective, policies = self.problem.inverse.effects(), self.problem.policies
-        uniform = policies.sample(self.rng)
+        anywhere = policies.sample(self.rng)
         if effective is None:
             middle = (policies.low + policies.high) / 2
             size = 1.0 if self.rng.random() < self.uniform else self.rng.random() ** _POWER
-            return policies.clip(middle + size * (uniform - middle))
+            return policies.clip(middle + size * (anywhere - middle))
         if len(self.problem.memory) > self._seen:  # several robots may move at once
             for theta in self._varied:
                 has_effect = bool(policies.same(effective.thetas, theta).any())
                 self.width = float(np.clip(self.width * _FACTOR ** (1 if has_effect else -1), _NARROWEST, _WIDEST))
             self._varied, self._seen = [], len(self.problem.memory)
         if not len(effective) or self.rng.random() < _ANYWHERE:
-            return uniform
+            return anywhere
         order = np.linalg.norm(effective.contexts - context, axis=1).argsort(kind="stable")
         theta = effective.thetas[self.rng.choice(order[:_SIMILAR] if effective.context_dim else order)]
         varied = policies.clip(self.rng.normal(theta, self.width * policies.sides))

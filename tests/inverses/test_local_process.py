@@ -1,4 +1,4 @@
-"""The local Gaussian process: its laws, and an answer that is given only where it should beat the nearest exemplar."""
+"""The local Gaussian process: its laws, and answers with the least expected error."""
 
 import numpy as np
 import pytest
