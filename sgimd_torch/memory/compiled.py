@@ -78,4 +78,4 @@ def _own_folder() -> tempfile.TemporaryDirectory[str]:
 
 @cache
 def _tell() -> None:
-    print("compiling once, about 15 s", file=sys.stderr, flush=True)
+    print("compiling once, about 20 s", file=sys.stderr, flush=True)

@@ -10,7 +10,9 @@ from numba import njit, types
 from sgimd_torch.spaces import Array
 
 _FAST: Final = {"reassoc", "contract", "nsz", "arcp"}  # sums may be reordered; NaN and infinity keep their meaning
-jit_helper = njit(nogil=True, fastmath=_FAST)  # decorator of a function that is compiled only as part of its caller
+# Decorator of a function that is compiled as part of its callers. Without forceinline, a process that also compiled the
+# function by itself would take that machine code, whose last bits differ.
+jit_helper = njit(nogil=True, fastmath=_FAST, forceinline=True)
 NUMBERS: Final = types.Array(types.float64, 1, "C", readonly=True)
 TABLE: Final = types.Array(types.float64, 2, "C", readonly=True)
 ROWS: Final = types.Array(types.int64, 1, "C", readonly=True)  # row numbers of a table

@@ -19,12 +19,12 @@ print(*side.nearest(np.array([[3.2]]), 2)[0])
 """
 LIFE = """
 from sgimd_torch import PlanarArm, practice, run
-robot = PlanarArm(3, noise=0.01)
-learner = practice(robot, 1000)
-for _ in run(learner, robot, 1000, movements=300): pass
+robot = PlanarArm(10, noise=0.05)
+learner = practice(robot, 1001)
+for _ in run(learner, robot, 1001, movements=60): pass
 print(hash(learner.memory.thetas.tobytes()))
 """
-SAID = "compiling once, about 15 s\n"
+SAID = "compiling once, about 20 s\n"
 
 
 @pytest.fixture
