@@ -15,9 +15,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from sgimd_torch.changes.calibration import Calibration, by_halves
-from sgimd_torch.changes.eras import NEAR, Era, Exemplars, predicted, squared
+from sgimd_torch.changes.eras import NEAR, Era, Exemplars, squared
 from sgimd_torch.inverses.gaussian_process import one_thread
-from sgimd_torch.inverses.local_process import LocalProcess
+from sgimd_torch.inverses.local_process import LocalProcess, predictions
 from sgimd_torch.memory import Memory, Rows
 from sgimd_torch.parts import Problem
 from sgimd_torch.spaces import Array
@@ -95,9 +95,10 @@ class ChangeDetector:
             return
         point = ((np.concatenate((theta, context)) - fitted.units[0]) / fitted.units[1])[None]
         near = fitted.inputs.nearest(point, NEAR)
-        expected, (variance,), _ = predicted(fitted.inputs, process.memory.outcomes, near, point, fitted.kernel)
+        predicted = predictions(fitted.inputs, process.memory.outcomes, near, point, fitted.kernel)
+        expected, (variance,), (noise,), _ = predicted
         self._errors.append(float(squared(expected[0] - outcome)))
-        surprise = self._errors[-1] / (len(outcome) * float(variance) + 1e-300)
+        surprise = self._errors[-1] / (len(outcome) * float(variance + noise) + 1e-300)
         self._surprises = [*self._surprises[-_RECENT:], surprise]
         if len(process.memory) >= _FIRST and len(self._surprises) >= _PREDICTED:
             self._accumulate(len(self.life) + 1)

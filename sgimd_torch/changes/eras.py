@@ -10,9 +10,8 @@ from typing import Final, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from sgimd_torch.inverses.local_process import FittedKernel
+from sgimd_torch.inverses.local_process import FittedKernel, predictions
 from sgimd_torch.memory import Memory, Rows
-from sgimd_torch.memory.compiled import compiled
 from sgimd_torch.memory.neighbours import Neighbours
 from sgimd_torch.memory.table import Table
 from sgimd_torch.spaces import Array
@@ -85,16 +84,9 @@ class Era:
         return np.asarray((raw - origin) / size)
 
     def _predict(self, near: Rows, points: Array) -> tuple[Array, Array, Array]:
-        return predicted(self._neighbours, self.exemplars.outcomes, near, points, self.fitted.kernel)
-
-
-def predicted(
-    inputs: Neighbours, outcomes: Array, near: Rows, points: Array, kernel: Array
-) -> tuple[Array, Array, Array]:
-    """Result of `kernels.predict`."""
-    predict = compiled("sgimd_torch.changes.kernels").predict
-    predictions: tuple[Array, Array, Array] = predict(inputs.keys.rows, outcomes, near, points, kernel)
-    return predictions
+        predicted = predictions(self._neighbours, self.exemplars.outcomes, near, points, self.fitted.kernel)
+        expected, variances, noises, slopes = predicted
+        return expected, variances + noises, slopes
 
 
 def squared(differences: Array) -> Array:

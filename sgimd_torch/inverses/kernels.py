@@ -354,13 +354,33 @@ def answer(
     return best, outcome, np.sqrt(max(1.0, surprise) * (variance + process.variance * kernel[3]))
 
 
-@compiled_for(TABLE, TABLE, ROWS, NUMBERS, NUMBERS)
-def fit_and_predict(
-    inputs: Array, outcomes: Array, rows: np.ndarray, point: Array, kernel: Array
-) -> tuple[Array, float]:
-    """Expected outcome of a movement, and its variance, by the process of the movements in ``rows``."""
-    process = fitted_process(as_columns(inputs, rows), as_columns(outcomes, rows), kernel)
-    return prediction(process, point.copy())
+@compiled_for(TABLE, TABLE, LISTS, TABLE, NUMBERS)
+def predictions(
+    inputs: Array, outcomes: Array, near: np.ndarray, points: Array, kernel: Array
+) -> tuple[Array, Array, Array, Array]:
+    """Expected outcomes ``(n, outcome_dim)`` of movements, their variances ``(n,)`` without noise, those of noise, and
+    the slopes of the outcomes by the inputs, ``(n, outcome_dim, dim)``.
+
+    Args:
+        inputs, outcomes: ``(rows, dim)``, in lengths, and ``(rows, outcome_dim)``, exemplars.
+        near: ``(n, k)``, rows of the exemplars from which each movement is predicted.
+        points: ``(n, dim)``, the movements in lengths.
+        kernel: ``(4,)``, see `GaussianProcess`.
+    """
+    n, m, dim = len(points), outcomes.shape[1], points.shape[1]
+    outcome, variances, noises, slopes = np.empty((n, m)), np.empty(n), np.empty(n), np.empty((n, m, dim))
+    covariance, slope = np.empty(near.shape[1]), np.empty(near.shape[1])
+    for i in range(n):
+        rows, point = near[i].copy(), points[i].copy()
+        process = fitted_process(as_columns(inputs, rows), as_columns(outcomes, rows), kernel)
+        covariances(process.inputs, kernel, point, covariance, slope)
+        outcome[i] = expected(process, covariance)
+        variances[i] = variance_at(process, covariance)
+        noises[i] = process.variance * kernel[3]
+        for k in range(m):
+            weighted_slopes = process.weights[k] * slope
+            slopes[i, k] = point * weighted_slopes.sum() - process.inputs @ weighted_slopes
+    return outcome, variances, noises, slopes
 
 
 @compiled_for(NUMBERS, NUMBERS, TABLE, NUMBERS, float64)

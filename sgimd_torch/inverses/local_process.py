@@ -17,7 +17,7 @@ from sgimd_torch.inverses.gaussian_process import choose_kernel, fit_lengths, on
 from sgimd_torch.inverses.locally_linear import NEAR, LocallyLinear
 from sgimd_torch.inverses.nearest import near_goal
 from sgimd_torch.memory.compiled import compiled
-from sgimd_torch.memory.neighbours import Neighbours
+from sgimd_torch.memory.neighbours import Neighbours, Rows
 from sgimd_torch.memory.table import Table
 from sgimd_torch.parts import Inverse, Problem
 from sgimd_torch.spaces import Array, Estimate, stream
@@ -38,6 +38,15 @@ class FittedKernel(NamedTuple):
     inputs: Neighbours
     units: Array
     kernel: Array
+
+
+def predictions(
+    inputs: Neighbours, outcomes: Array, near: Rows, points: Array, kernel: Array
+) -> tuple[Array, Array, Array, Array]:
+    """Result of `kernels.predictions`."""
+    kernels = compiled("sgimd_torch.inverses.kernels")
+    predicted: tuple[Array, Array, Array, Array] = kernels.predictions(inputs.keys.rows, outcomes, near, points, kernel)
+    return predicted
 
 
 class LocalProcess(Inverse):
@@ -107,9 +116,9 @@ class LocalProcess(Inverse):
         if self._kernel is None:
             return (self.memory.outcomes[-1], 0.0) if self._due > _FIRST else None
         point = (np.concatenate((theta, context)) - self._units[0]) / self._units[1]
-        (rows,) = self._inputs.nearest(point[None], _MOST_ALIKE)
-        kernels = compiled("sgimd_torch.inverses.kernels")
-        return kernels.fit_and_predict(self._inputs.keys.rows, self.memory.outcomes, rows, point, self._kernel)
+        near = self._inputs.nearest(point[None], _MOST_ALIKE)
+        (outcome,), (variance,), *_ = predictions(self._inputs, self.memory.outcomes, near, point[None], self._kernel)
+        return outcome, float(variance)
 
     def fitted(self) -> FittedKernel | None:
         """What predictions are made from; None while there are too few exemplars, or all outcomes are equal."""
@@ -146,8 +155,7 @@ class LocalProcess(Inverse):
         drawn = order[:_FITTED]
         lengths = fit_lengths((unscaled[drawn] - origin) / self._spreads, outcomes[drawn])
         self._units = np.stack((origin, self._spreads * lengths))
-        self._inputs = Neighbours(Table(unscaled.shape[1]))
-        self._inputs.keys.append(self._scaled(0)[:n])
+        self._inputs = Neighbours(Table(unscaled.shape[1], self._scaled(0)[:n]))
         inputs = self._inputs.keys.rows
         groups = self._inputs.nearest(inputs[order[:_GROUPS]], _GROUP)
         varied = [rows for rows in groups if np.ptp(outcomes[rows], axis=0).any()]
