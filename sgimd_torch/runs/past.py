@@ -8,12 +8,11 @@ from __future__ import annotations
 import csv
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
 from sgimd_torch.environments.protocol import Environment
-from sgimd_torch.files import checksum
+from sgimd_torch.files import checksum, is_record
 from sgimd_torch.learner.events import Kind
 from sgimd_torch.memory import Memory
 from sgimd_torch.options.signature import parsed
@@ -21,7 +20,6 @@ from sgimd_torch.record import Record, RunError
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.spaces import Array, Box, check_vector
 
-_SQLITE: Final = b"SQLite format 3"  # a record begins with it
 Exemplar = tuple[Array, Array, Array]
 
 
@@ -40,9 +38,7 @@ def past_of(task: Task, path: Path) -> tuple[Memory, list[str], str]:
         OSError: the file cannot be read.
     """
     robot, crc32 = task.environment, checksum(path)
-    with path.open("rb") as file:
-        recorded = file.read(len(_SQLITE)) == _SQLITE
-    exemplars = list(_recorded(path, robot) if recorded else _listed(path, robot))
+    exemplars = list(_recorded(path, robot) if is_record(path) else _listed(path, robot))
     if not exemplars:
         raise RunError(f"{path} holds no movements to begin with")
     contexts, thetas, outcomes = (np.stack(column) for column in zip(*exemplars, strict=True))
