@@ -78,11 +78,11 @@ def test_every_output_is_written_by_the_functions_of_one_file():
         for path in PACKAGE.rglob("*.py")
         for call in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         if isinstance(call, ast.Call) and isinstance(call.func, ast.Attribute | ast.Name)
-        if (isinstance(call.func, ast.Attribute) and call.func.attr in {"write_text", "write_bytes", "touch"})
+        if (isinstance(call.func, ast.Attribute) and call.func.attr in {"write_text", "write_bytes"})
         or (name_of(call.func) == "open" and {*"wax"} & {*"".join(a.value for a in call.args if is_mode(a))})
     }
     log = ("runs/parallel.py", "open")  # of the runs of a sweep, which only grows
-    assert writers - {log} == {("files.py", "write_bytes"), ("files.py", "touch")}
+    assert writers - {log} == {("files.py", "write_bytes")}
 
 
 def is_mode(argument: ast.expr) -> bool:
