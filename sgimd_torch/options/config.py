@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, Final, NamedTuple, Self
+from typing import Any, Final, NamedTuple, Self, get_args
 
 from sgimd_torch.options.catalogue import ROD, TAUGHT_BY, WORDS, did_you_mean, load_word, word_of
 from sgimd_torch.options.signature import Option, as_text, options_of, parameters_of, parsed
@@ -162,8 +162,12 @@ class Config:
         return json.loads(json.dumps(self.values, default=str))
 
     @classmethod
-    def from_settings(cls, settings: Mapping[str, Any]) -> Self:
+    def from_settings(cls, settings: Mapping[str, Any], folder: Path = Path()) -> Self:
         """The run with these values by name, as json values or as a user types them; others have their defaults.
+
+        Args:
+            settings: values by name.
+            folder: folder in which relative paths begin, if something is there; else they begin in the present one.
 
         Raises:
             ValueError: a value is of another type or out of its range, or an option does not exist.
@@ -176,6 +180,8 @@ class Config:
             elif isinstance(value, str) and not isinstance(kind, str | None):
                 try:
                     values[name] = parsed(value, kind)
+                    if Path in (kind, *get_args(kind)) and value and (folder / value).exists():
+                        values[name] = type(values[name])(folder / value)
                 except ValueError as error:
                     raise ValueError(f"--{dashed(name)} {error}") from error
         parts = {name: value for name, value in values.items() if name not in RUN}

@@ -23,12 +23,13 @@ from sgimd_torch.spaces import Array, Box, check_vector
 Exemplar = tuple[Array, Array, Array]
 
 
-def past_of(task: Task, path: Path) -> tuple[Memory, list[str], str]:
+def past_of(task: Task, path: Path, record: Path | None = None) -> tuple[Memory, list[str], str]:
     """The movements in a record, or in a csv file with columns ``context_0``, ``theta_0``, ``outcome_0`` and so on.
 
     Args:
         task: task of the run, whose robot must have the dimensions of these movements.
         path: record or csv file.
+        record: record of the run, if it is on disk. It has these movements, too, so the file may be gone.
 
     Returns:
         The movements, messages about them, and the checksum of the file.
@@ -37,8 +38,13 @@ def past_of(task: Task, path: Path) -> tuple[Memory, list[str], str]:
         ValueError: the file is damaged or has no movements, or its robot has other dimensions, units or bounds.
         OSError: the file cannot be read.
     """
-    robot, crc32 = task.environment, checksum(path)
-    exemplars = list(_recorded(path, robot) if is_record(path) else _listed(path, robot))
+    robot, exemplars, crc32 = task.environment, list[Exemplar](), ""
+    if record is not None:
+        exemplars, crc32 = _kept(record, robot)
+    if not exemplars or path.exists():
+        crc32 = checksum(path)
+    if not exemplars:
+        exemplars = list(_recorded(path, robot) if is_record(path) else _listed(path, robot))
     if not exemplars:
         raise RunError(f"{path} holds no movements to begin with")
     contexts, thetas, outcomes = (np.stack(column) for column in zip(*exemplars, strict=True))
@@ -47,6 +53,15 @@ def past_of(task: Task, path: Path) -> tuple[Memory, list[str], str]:
     memory = Memory(robot.contexts.dim, robot.policies.dim, robot.outcomes.dim)
     memory.extend(contexts, thetas, check_vector(f"outcomes of {path}", outcomes, robot.outcomes.dim))
     return memory, [f"begins with {len(memory)} movements of {path}, as far as they help"], crc32
+
+
+def _kept(path: Path, robot: Environment) -> tuple[list[Exemplar], str]:
+    """The movements with which a run of this robot began, and the checksum of the file from which they came."""
+    c, p, t = robot.contexts.dim, robot.policies.dim, robot.outcomes.dim
+    with Record(path) as record:
+        rows = np.array([*record.rows("prior")]) if record.dims == (c, p, t) else np.empty((0, c + p + t))
+        contexts, thetas, outcomes = np.split(rows.reshape(-1, c + p + t), (c, c + p), axis=1)
+        return [*zip(contexts, thetas, outcomes, strict=True)], record.about.get("files", {}).get("begin_with_crc32")
 
 
 def _recorded(path: Path, robot: Environment) -> Iterator[Exemplar]:

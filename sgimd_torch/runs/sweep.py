@@ -81,11 +81,9 @@ def run_all(whole: Sequence[Config], options: argparse.Namespace, out: Path) -> 
     if options.dry_run or not left:
         return 0
     with loading():
-        from sgimd_torch.runs.directory import RUN_FILE, build_again, holds_run  # imported here so that --help is fast
+        from sgimd_torch.runs.directory import build_again, record_of  # imported here so that --help is fast
     for config in {config.directory.parent: config for config in left}.values():
-        build_again(
-            config, recorded=holds_run(config.directory / RUN_FILE)
-        )  # wrong options raise an error before any run starts
+        build_again(config, record_of(config))  # wrong options raise an error before any run starts
     make_folder(out)
     failures = sweep(left, options.processes)
     say(f"{len(left) - len(failures)} runs ended well, {len(failures)} failed: {out}", *failures)

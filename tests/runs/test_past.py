@@ -56,6 +56,18 @@ def test_a_run_begins_with_a_run_or_an_equal_table_and_is_resumed_with_it(past, 
     assert "begin_with_crc32 was" in capsys.readouterr().err
 
 
+def test_a_run_is_asked_and_resumed_when_the_file_it_began_with_is_gone(past, tmp_path, monkeypatch):
+    listed = table(tmp_path / "past.csv", past)
+    for name in ("whole", "cut"):
+        assert go(tmp_path / name, "--movements", 40 if name == "whole" else 20, "--begin-with", listed) == 0
+    listed.unlink()
+    monkeypatch.chdir(tmp_path / "cut")
+    assert load_learner("practice/seed-000").movements == 20
+    assert go(".", "--movements", 40, "--begin-with", "../past.csv", "--resume") == 0
+    assert content_of(tmp_path / "cut/practice/seed-000") == content_of(tmp_path / "whole/practice/seed-000")
+    assert len(content_of(tmp_path / "cut/practice/seed-000")["prior"]) == 120
+
+
 def refused(path, said, out, capsys):
     """It is refused as a past in one line, and nothing is left."""
     capsys.readouterr()
