@@ -7,6 +7,7 @@ All modules of the library replace files by these functions.
 
 from __future__ import annotations
 
+import csv
 import io
 import lzma
 import math
@@ -124,6 +125,23 @@ def write_npz(path: str | os.PathLike[str], arrays: Mapping[str, Any]) -> None:
     buffer = io.BytesIO()
     np.savez_compressed(buffer, **arrays)
     write_bytes(path, buffer.getvalue())
+
+
+def read_csv(path: str | os.PathLike[str]) -> list[tuple[int, list[str]]]:
+    """The rows of a table with commas that have any field, each with the number of its line, from 1.
+
+    Raises:
+        ValueError: the file is no such table, or has more than 256 MB.
+        OSError: there is no file, or it is a pipe or a device.
+    """
+    check_regular(path)
+    if os.path.getsize(path) > _LARGE:
+        raise ValueError(f"{path} has {os.path.getsize(path)} bytes, more than the {_LARGE} that such a table may have")
+    with open(path, encoding="utf-8", newline="") as file:
+        try:
+            return [(rows.line_num, row) for rows in [csv.reader(file)] for row in rows if row]
+        except (csv.Error, UnicodeDecodeError) as error:
+            raise ValueError(f"{path} is no csv file: {error}") from error
 
 
 def read_npz(path: str | os.PathLike[str], kind: str, writer: str, names: Sequence[str]) -> list[Stored]:

@@ -18,6 +18,7 @@ from sgimd_torch.files import (
     check_writable,
     checksum,
     make_folder,
+    read_csv,
     read_npz,
     replacing,
     write_bytes,
@@ -225,10 +226,28 @@ def test_a_benchmark_that_cannot_be_is_refused_in_few_words_and_not_saved(tmp_pa
     assert len(str(raised.value)) < 400
 
 
-@pytest.mark.parametrize(
-    "load", [load_benchmark, load_demonstrations, checksum, lambda path: read_text(path, ColumnNames(("a",), ("x",)))]
-)
+READERS = [load_benchmark, load_demonstrations, checksum, read_csv]
+
+
+@pytest.mark.parametrize("load", [*READERS, lambda path: read_text(path, ColumnNames(("a",), ("x",)))])
 def test_a_named_pipe_is_refused_and_keeps_nobody_waiting(tmp_path, load):
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(OSError, match="pipe is a pipe or a device, not a file"):
         load(tmp_path / "pipe")
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"x,y\n" + b"1" * 200_000, "is no csv file: field larger than field limit"),
+        (b"x\xff,y", "is no csv file: 'utf-8' codec can't decode"),
+        (None, "has 300000000 bytes, more than the 268435456 that such a table may have"),
+    ],
+)
+def test_a_table_of_absurd_size_is_refused_by_name(tmp_path, content, said):
+    path = tmp_path / "goals.csv"
+    path.write_bytes(content or b"")
+    if content is None:
+        os.truncate(path, 300_000_000)  # it takes no room on the disk
+    with pytest.raises(ValueError, match=rf"goals\.csv {said}"):
+        read_csv(path)

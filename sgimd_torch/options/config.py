@@ -25,6 +25,7 @@ FILES: Final = ("benchmark", "demonstrations", "begin_with")  # options that nam
 OF_TEACHING: Final = ("demonstrations", "teacher", "teachers", "social")  # options of taught algorithms
 LEAST: Final = {"seed": 0, "movements": 1, "repeats": 0, "failures": 1, "at_once": 1, "evaluate_at": 1, "floor_at": 1}
 """Least value of an option, or of each of its numbers."""
+MOST_MOVEMENTS: Final = 10**8
 
 
 @dataclass(frozen=True)
@@ -94,6 +95,8 @@ class Config:
             value = getattr(self, name)
             if value is not None and min(value if isinstance(value, tuple) else (value,), default=least) < least:
                 raise ValueError(f"{name} must be at least {least}, got {as_text(value)}")
+        if self.movements > MOST_MOVEMENTS:
+            raise ValueError(f"movements must be at most {MOST_MOVEMENTS}, got {self.movements}")
         if self.until is not None and not 0 < self.until < math.inf:
             raise ValueError(f"until must be an error above 0, in the unit of T, got {self.until}")
         if self.repeats == 1:

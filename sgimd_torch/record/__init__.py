@@ -43,7 +43,8 @@ from sgimd_torch.spaces import Demonstration
 
 __all__ = ["DERIVED", "Dims", "Record", "ReplayError", "Row", "RunError", "layout"]
 
-_LOCAL: Final = "ext2 ext3 ext4 xfs btrfs tmpfs overlay zfs f2fs bcachefs".split()  # file systems of one machine
+_LOCAL: Final = {"ext2", "ext3", "ext4", "xfs", "btrfs", "tmpfs", "overlay", "zfs", "f2fs", "bcachefs"}
+"""File systems of one machine."""
 _ROWS_AT_ONCE: Final = 4096  # number of rows that one query reads
 
 
@@ -76,7 +77,7 @@ class Record:
         self._connection = _connect(self.path, write)
         self._log_waits = write and _shares_memory(self.path)  # for the first commit, which is to begin it
         try:
-            with self._translated_errors():
+            with self.translated_errors():
                 self._lock() if write else self._copy()
                 self._open()
                 for table in layout(self.dims) if write else ():  # nothing is added to a damaged record
@@ -126,7 +127,7 @@ class Record:
         number = 0
         # No cursor stays open between yields, because the log cannot begin while one is open.
         next_rows = f"SELECT rowid, * FROM {table} WHERE rowid > ? ORDER BY rowid LIMIT {_ROWS_AT_ONCE}"
-        with self._translated_errors():
+        with self.translated_errors():
             while rows := self._connection.execute(next_rows, (number,)).fetchall():
                 for rowid, *row, checksum in rows:
                     number += 1
@@ -160,7 +161,7 @@ class Record:
 
     def replace_rows(self, table: str, rows: Iterable[Sequence[Any]]) -> None:
         """Replace all rows of a table."""
-        with self._translated_errors(writing=True):
+        with self.translated_errors(writing=True):
             self._connection.execute(f"DELETE FROM {table}")
         self._n_rows[table] = 0
         self._append(table, [plain(row) for row in rows])
@@ -177,7 +178,7 @@ class Record:
             RunError: another process has written in the meantime.
         """
         self.replace_rows("about", _about_rows(self.about, self._n_rows))
-        with self._translated_errors(writing=True):
+        with self.translated_errors(writing=True):
             try:
                 self._connection.execute("COMMIT")
             except sqlite3.OperationalError as error:
@@ -207,7 +208,7 @@ class Record:
         if rows:
             complete = _with_checksums(rows, self._n_rows[table])
             marks = ", ".join("?" * len(complete[0]))
-            with self._translated_errors(writing=True):
+            with self.translated_errors(writing=True):
                 self._connection.executemany(f"INSERT INTO {table} VALUES ({marks})", complete)
             self._n_rows[table] += len(rows)
 
@@ -247,7 +248,7 @@ class Record:
             raise RunError("another process has written to it")
 
     @contextmanager
-    def _translated_errors(self, *, writing: bool = False) -> Iterator[None]:
+    def translated_errors(self, *, writing: bool = False) -> Iterator[None]:
         """Turn errors of SQLite, and errors from unexpected values, into RunError or OSError with the path."""
         if self._failure is not None:
             raise self._failure

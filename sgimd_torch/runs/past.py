@@ -5,14 +5,13 @@ memory, notes, crc32 = past_of(task, Path("simulated/practice/seed-000/run.sqlit
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from sgimd_torch.environments.protocol import Environment
-from sgimd_torch.files import checksum, is_record
+from sgimd_torch.files import checksum, is_record, read_csv
 from sgimd_torch.learner.events import Kind
 from sgimd_torch.memory import Memory
 from sgimd_torch.options.signature import parsed
@@ -71,8 +70,10 @@ def _recorded(path: Path, robot: Environment) -> Iterator[Exemplar]:
     with Record(path) as record:
         if record.dims != dims:
             raise RunError(f"{path} has dims {record.dims} of context, theta, outcome, this robot has {dims}")
-        for name, given in record.about.get("spaces", {}).items():
-            recorded, box = Box(*given), boxes[name]
+        with record.translated_errors():
+            spaces = {name: Box(*record.about["spaces"][name]) for name in boxes if "spaces" in record.about}
+        for name, recorded in spaces.items():
+            box = boxes[name]
             if recorded.unit != box.unit:
                 raise RunError(f"{name} of {path} are in {recorded.unit or 'no unit'}, here in {box.unit or 'no unit'}")
             if name != "outcomes" and not (
@@ -93,20 +94,19 @@ def _listed(path: Path, robot: Environment) -> Iterator[Exemplar]:
     """Exemplars of a csv file; other columns do not matter."""
     boxes = {"context": robot.contexts, "theta": robot.policies, "outcome": robot.outcomes}
     wanted = [[f"{name}_{k}" for k in range(box.dim)] for name, box in boxes.items()]
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except UnicodeDecodeError as error:
-        raise RunError(f"{path} is neither a record nor a csv file") from error
-    rows = csv.DictReader(lines)
-    heads = rows.fieldnames or ()
-    lacking = [name for names in wanted for name in names if name not in heads]
-    more = [f"{name}_{box.dim}" for name, box in boxes.items() if f"{name}_{box.dim}" in heads]
-    if lacking or more:
-        why = f"lacks the column {lacking[0]}" if lacking else f"has a column {more[0]}, so it is of another robot"
-        raise RunError(f"{path} {why}; this robot needs {', '.join(name for names in wanted for name in names)}")
-    for number, row in enumerate(rows, 2):
+    all_wanted = [name for names in wanted for name in names]
+    (_, heads), *rows = read_csv(path) or [(1, [])]
+    faults = [f"lacks the column {name}" for name in all_wanted if name not in heads]
+    faults += [f"has two columns {name}" for name in all_wanted if heads.count(name) > 1]
+    more = [f"{name}_{box.dim}" for name, box in boxes.items()]
+    faults += [f"has a column {name}, so it is of another robot" for name in more if name in heads]
+    if faults:
+        raise RunError(f"{path} {faults[0]}; this robot needs {', '.join(all_wanted)}")
+    for number, row in rows:
+        cells = dict(zip(heads, row, strict=False))
         try:
-            context, theta, outcome = (np.array([parsed(row[name] or "", float) for name in names]) for names in wanted)
+            numbers = ([parsed(cells.get(name, ""), float) for name in names] for names in wanted)
+            context, theta, outcome = map(np.array, numbers)
         except ValueError as error:
-            raise RunError(f"{path}: line {number} is no movement of {sum(map(len, wanted))} numbers") from error
+            raise RunError(f"{path}: line {number} is no movement of {len(all_wanted)} numbers") from error
         yield context, theta, outcome

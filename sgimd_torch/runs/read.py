@@ -155,35 +155,36 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         n = record.movements
     evaluated = derived["evaluations"]["movements"]
     is_empty = not demonstrations and not np.isfinite(arrays["outcomes"]).any()  # an empty memory is not evaluated
-    end, expected = about["ended_early"] or (settings["movements"], None)
-    finished = n == end and (settings["evaluate_at"] == [] or n in evaluated or is_empty)
-    return Run(
-        path=path,
-        config=settings,
-        versions=about["versions"],
-        files=about["files"],
-        robot=about["robot"],
-        words=about["words"],
-        folder=about.get("folder", ""),
-        tolerance=about.get("tolerance", float("nan")),
-        spaces={name: Box(*box) for name, box in about["spaces"].items()},
-        summary={
-            "movements": n,
-            "failed": int(arrays["failed"].sum()),
-            "finished": bool(finished),
-            "expected": expected,
-            **about.get("seconds", {}),
-        },
-        **arrays,
-        evaluations=_by_inverse(derived["evaluations"]),
-        errors=derived["errors"],
-        benchmark=np.stack(list(derived["goals"].values())[1:], axis=1),
-        demonstrations=demonstrations,
-        regions=_if_any(derived["regions"]),
-        predictions=_if_any(derived["predictions"]),
-        refreshes=_if_any(derived["refreshes"]),
-        requests=requests,
-    )
+    with record.translated_errors():
+        end, expected = about["ended_early"] or (settings["movements"], None)
+        finished = n == end and (settings["evaluate_at"] == [] or n in evaluated or is_empty)
+        return Run(
+            path=path,
+            config=settings,
+            versions=about["versions"],
+            files=about["files"],
+            robot=about["robot"],
+            words=about["words"],
+            folder=about.get("folder", ""),
+            tolerance=about.get("tolerance", float("nan")),
+            spaces={name: Box(*box) for name, box in about["spaces"].items()},
+            summary={
+                "movements": n,
+                "failed": int(arrays["failed"].sum()),
+                "finished": bool(finished),
+                "expected": expected,
+                **about.get("seconds", {}),
+            },
+            **arrays,
+            evaluations=_by_inverse(derived["evaluations"]),
+            errors=derived["errors"],
+            benchmark=np.stack(list(derived["goals"].values())[1:], axis=1),
+            demonstrations=demonstrations,
+            regions=_if_any(derived["regions"]),
+            predictions=_if_any(derived["predictions"]),
+            refreshes=_if_any(derived["refreshes"]),
+            requests=requests,
+        )
 
 
 def _if_any(columns: Columns) -> Columns | None:
