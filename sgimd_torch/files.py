@@ -7,7 +7,6 @@ All modules of the library replace files by these functions.
 
 from __future__ import annotations
 
-import csv
 import io
 import lzma
 import math
@@ -31,7 +30,7 @@ _UNREADABLE: Final = (
     *(SyntaxError, tokenize.TokenError, zipfile.BadZipFile, zlib.error, lzma.LZMAError),
 )
 _RECORD: Final = b"SQLite format 3", b"7\x7f\x06"  # beginnings of a record and of its write-ahead log
-_LARGE: Final = 2**28  # bytes that any file may take
+LARGE: Final = 2**28  # bytes that any file may take
 _DENSE: Final = 100  # bytes that each byte of a larger file may take
 
 
@@ -52,7 +51,7 @@ def check_density(n_bytes: int, path: str | os.PathLike[str]) -> None:
     Raises:
         ValueError: the content would take more than 256 MB, and more than 100 times the size of the file.
     """
-    if n_bytes > max(_LARGE, _DENSE * os.path.getsize(path)):
+    if n_bytes > max(LARGE, _DENSE * os.path.getsize(path)):
         raise ValueError(f"it would take {n_bytes} bytes of memory, far more than the {os.path.getsize(path)} it has")
 
 
@@ -125,23 +124,6 @@ def write_npz(path: str | os.PathLike[str], arrays: Mapping[str, Any]) -> None:
     buffer = io.BytesIO()
     np.savez_compressed(buffer, **arrays)
     write_bytes(path, buffer.getvalue())
-
-
-def read_csv(path: str | os.PathLike[str]) -> list[tuple[int, list[str]]]:
-    """The rows of a table with commas that have any field, each with the number of its line, from 1.
-
-    Raises:
-        ValueError: the file is no such table, or has more than 256 MB.
-        OSError: there is no file, or it is a pipe or a device.
-    """
-    check_regular(path)
-    if os.path.getsize(path) > _LARGE:
-        raise ValueError(f"{path} has {os.path.getsize(path)} bytes, more than the {_LARGE} that such a table may have")
-    with open(path, encoding="utf-8", newline="") as file:
-        try:
-            return [(rows.line_num, row) for rows in [csv.reader(file)] for row in rows if row]
-        except (csv.Error, UnicodeDecodeError) as error:
-            raise ValueError(f"{path} is no csv file: {error}") from error
 
 
 def read_npz(path: str | os.PathLike[str], kind: str, writer: str, names: Sequence[str]) -> list[Stored]:

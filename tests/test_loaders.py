@@ -18,7 +18,6 @@ from sgimd_torch.files import (
     check_writable,
     checksum,
     make_folder,
-    read_csv,
     read_npz,
     replacing,
     write_bytes,
@@ -27,6 +26,7 @@ from sgimd_torch.files import (
 )
 from sgimd_torch.record import Record
 from sgimd_torch.record.saving import save_life
+from sgimd_torch.runs.past import read_csv
 from sgimd_torch.spaces import Demonstration
 
 LESSON = Demonstration(np.zeros(0), np.arange(3.0), np.ones((3, 2)), np.zeros(2))

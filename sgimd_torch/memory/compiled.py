@@ -79,9 +79,8 @@ def _folder(chosen: str) -> str:
 
 def _remove_damaged(folder: Path) -> None:
     """Remove all files that are not as they were listed."""
-    listed = list[str]()
-    with suppress(FileNotFoundError):
-        listed = (folder / _LIST).read_text(encoding="utf-8", errors="replace").splitlines()
+    checksums = folder / _LIST
+    listed = checksums.read_text(encoding="utf-8", errors="replace").splitlines() if checksums.exists() else ()
     for path, line in _files(folder):
         if line not in listed:
             path.unlink(missing_ok=True)

@@ -20,7 +20,6 @@ from sgimd_torch.options.built import call_checked
 from sgimd_torch.options.catalogue import function_of, load_word
 from sgimd_torch.options.config import FILES, OWN, Config
 from sgimd_torch.parts import Demonstrator, Inverse, Teacher
-from sgimd_torch.runs.at_once import check_at_once
 from sgimd_torch.runs.tasks import Task, benchmark_of
 from sgimd_torch.spaces import stream
 
@@ -81,7 +80,10 @@ def build(config: Config, record: Path | None = None) -> RunParts:
     task = task_of(config)
     robot, readers = task.environment, dict[str, Callable[..., Any]](benchmark=benchmark_of)
     config = config.with_found(robot.found_options if isinstance(robot, FromFiles) else {})
-    check_at_once(robot, config.at_once)
+    if config.at_once > 1:
+        from sgimd_torch.runs.at_once import check_at_once  # most runs have one robot
+
+        check_at_once(robot, config.at_once)
     own = [config.constructor("teacher")] if config.teaching == "teacher" else []
     asked = {word: load_word("teachers", word) for word in config.asked}
     if any(map(_needs_demonstrations, (*own, *asked.values()))):

@@ -5,13 +5,14 @@ memory, notes, crc32 = past_of(task, Path("simulated/practice/seed-000/run.sqlit
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from sgimd_torch.environments.protocol import Environment
-from sgimd_torch.files import checksum, is_record, read_csv
+from sgimd_torch.files import LARGE, check_regular, checksum, is_record
 from sgimd_torch.learner.events import Kind
 from sgimd_torch.memory import Memory
 from sgimd_torch.options.signature import parsed
@@ -110,3 +111,20 @@ def _listed(path: Path, robot: Environment) -> Iterator[Exemplar]:
         except ValueError as error:
             raise RunError(f"{path}: line {number} is no movement of {len(all_wanted)} numbers") from error
         yield context, theta, outcome
+
+
+def read_csv(path: Path) -> list[tuple[int, list[str]]]:
+    """The rows of a table with commas that have any field, each with the number of its line, from 1.
+
+    Raises:
+        ValueError: the file is no such table, or has more than 256 MB.
+        OSError: there is no file, or it is a pipe or a device.
+    """
+    check_regular(path)
+    if path.stat().st_size > LARGE:
+        raise ValueError(f"{path} has {path.stat().st_size} bytes, more than the {LARGE} that such a table may have")
+    with path.open(encoding="utf-8", newline="") as file:
+        try:
+            return [(rows.line_num, row) for rows in [csv.reader(file)] for row in rows if row]
+        except (csv.Error, UnicodeDecodeError) as error:
+            raise ValueError(f"{path} is no csv file: {error}") from error

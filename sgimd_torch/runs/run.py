@@ -9,7 +9,7 @@ import math
 import time
 import traceback
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -20,11 +20,10 @@ from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.learner.events import Event, Kind
 from sgimd_torch.options.build import RunParts
 from sgimd_torch.record import ReplayError, Row, RunError
-from sgimd_torch.runs.at_once import executing
 from sgimd_torch.runs.directory import open_run
 from sgimd_torch.runs.evaluations import Evaluations, ends_now
 from sgimd_torch.runs.signals import Failed, Progress, Stopped, Stopping, say
-from sgimd_torch.session import NoOutcomeError, run
+from sgimd_torch.session import Execute, NoOutcomeError, live, run
 from sgimd_torch.spaces import Episode
 
 N_TOLD: Final = 3  # number of failures with a message each; later ones are only counted
@@ -159,8 +158,13 @@ class RunLoop:
     def episodes(self) -> Iterator[Episode]:
         """All episodes, one by one: first the recorded ones, then new ones."""
         parts, config = self.parts, self.parts.config
-        robot = parts.environment, config.constructor("environment")
-        with executing(*robot, config.seed, config.at_once) as execute:
+        executing: AbstractContextManager[Execute] = nullcontext(live(parts.environment, config.seed))
+        if config.at_once > 1:
+            from sgimd_torch.runs import at_once  # most runs have one robot
+
+            robot = parts.environment, config.constructor("environment")
+            executing = at_once.executing(*robot, config.seed, config.at_once)
+        with executing as execute:
             episodes = run(
                 parts.learner,
                 parts.environment,

@@ -23,10 +23,11 @@ import numpy as np
 
 from sgimd_torch.environments.motor_primitives import GaussianPrimitive
 from sgimd_torch.environments.protocol import primitive_of
-from sgimd_torch.files import check_writable, read_csv, write_text
+from sgimd_torch.files import check_writable, write_text
 from sgimd_torch.options.build import RunParts
 from sgimd_torch.options.signature import parsed
 from sgimd_torch.runs.load import OpenRun
+from sgimd_torch.runs.past import read_csv
 from sgimd_torch.runs.signals import parser_of
 from sgimd_torch.spaces import Array, Box, stream
 
