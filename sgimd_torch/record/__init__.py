@@ -290,7 +290,7 @@ def _shares_memory(path: Path) -> bool:
     except OSError:  # only Linux has this list
         return True
     kinds = {place: kind for place, kind in mounts if path.resolve().is_relative_to(place)}
-    return kinds[max(kinds, key=len)] in _LOCAL
+    return kinds.get(max(kinds, key=len, default="")) in _LOCAL
 
 
 def _tables(dims: Dims) -> dict[str, str]:

@@ -278,7 +278,10 @@ def finished(config: Config) -> bool:
         run, wanted = read_run(config.directory), with_found_earlier(config).settings
         others = {*differing(run.config, wanted, run.folder)} - {*NOT_COMPARED}
         return bool(run.summary["finished"] and not others) and all(
-            config[name] is None or run.files.get(f"{name}_crc32") in (None, checksum(config[name])) for name in FILES
+            config[name] is None
+            or (name == "begin_with" and not config[name].exists())  # the record has its content
+            or run.files.get(f"{name}_crc32") in (None, checksum(config[name]))
+            for name in FILES
         )
     except (ValueError, OSError):  # another version, or unreadable; --resume will give the reason
         return False

@@ -8,12 +8,12 @@ import pytest
 from runs import content_of, edit, write_about
 from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.options.command_line import main
+from sgimd_torch.options.command_line import main, parse
 from sgimd_torch.record import RunError
 from sgimd_torch.record.saving import save_life
 from sgimd_torch.runs.directory import RUN_FILE
 from sgimd_torch.runs.load import load_learner
-from sgimd_torch.runs.read import read_run
+from sgimd_torch.runs.read import finished, read_run
 from sgimd_torch.runs.signals import command
 
 SHORT = ["--environment", "planar-arm-7", "--repeats", "0", "--evaluate-at", "[]"]
@@ -67,6 +67,8 @@ def test_a_run_is_asked_and_resumed_when_the_file_it_began_with_is_gone(past, tm
     assert go(".", "--movements", 40, "--begin-with", "../past.csv", "--resume") == 0
     assert content_of(tmp_path / "cut/practice/seed-000") == content_of(tmp_path / "whole/practice/seed-000")
     assert len(content_of(tmp_path / "cut/practice/seed-000")["prior"]) == 120
+    config, _ = parse([*SHORT, "--out", ".", "--movements", "40", "--begin-with", "../past.csv"])
+    assert finished(config)
 
 
 def refused(path, said, out, capsys):
