@@ -11,6 +11,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import math
+import os
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -183,7 +184,7 @@ class Config:
             elif isinstance(value, str) and not isinstance(kind, str | None):
                 try:
                     values[name] = parsed(value, kind)
-                    if Path in (kind, *get_args(kind)) and value and (folder / value).exists():
+                    if Path in (kind, *get_args(kind)) and value and os.path.exists(folder / value):
                         values[name] = type(values[name])(folder / value)
                 except ValueError as error:
                     raise ValueError(f"--{dashed(name)} {error}") from error

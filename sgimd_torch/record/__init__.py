@@ -278,6 +278,8 @@ def _connect(path: Path, write: bool) -> sqlite3.Connection:
         # Readers need mode=rw, too, to clean up after a killed writer. SQLite still opens a read-only file for reading.
         # check_same_thread=False: teaching by hand opens the record in one thread and later uses it in another.
         place, patience = f"{path.resolve().as_uri()}?mode=rw", 0.5 if write else 10.0
+        if not (write or os.access(path.parent, os.W_OK) or path.with_name(f"{path.name}-wal").exists()):
+            place += "&immutable=1"  # else SQLite would make a log for the record of a run that was killed
         return sqlite3.connect(place, uri=True, isolation_level=None, timeout=patience, check_same_thread=False)
     except (sqlite3.Error, OSError) as error:
         raise RunError(f"{path} cannot be opened: {error}") from error
