@@ -64,19 +64,21 @@ def in_processes(make: Callable[[], Any], seed: int, processes: int) -> Iterator
     # A forked process would share the locks of this one's threads.
     spawning = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(processes, spawning, _begin, (make, seed))
+    workers = pool._processes  # filled as movements come
 
     def execute(indices: Sequence[int], contexts: Sequence[Array], thetas: Sequence[Array]) -> list[Array | Failure]:
         try:
             return list(pool.map(_execute, indices, contexts, thetas))
         except BrokenProcessPool as error:
-            codes = {process.exitcode for process in pool._processes.values()} - {None}  # the pool ends the others
+            pool.shutdown()  # it ends the other processes by SIGTERM
+            codes = [process.exitcode for process in workers.values()]
             code = next((code for code in codes if code != -signal.SIGTERM), -signal.SIGTERM)
             raise SimulationError(f"a process that executes movements ended with exit code {code}; {ONE}") from error
 
     try:
         yield execute
     except BaseException:  # after a second Ctrl-C, too, nothing waits for a robot that hangs
-        for process in list(pool._processes.values()):
+        for process in list(workers.values()):
             process.kill()
         raise
     finally:
