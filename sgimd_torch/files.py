@@ -29,7 +29,8 @@ _UNREADABLE: Final = (
     *(ValueError, TypeError, AttributeError, OSError, EOFError, RuntimeError, MemoryError, OverflowError),
     *(SyntaxError, tokenize.TokenError, zipfile.BadZipFile, zlib.error, lzma.LZMAError),
 )
-_LARGE: Final = 2**28  # bytes that any file may take
+_RECORD: Final = b"SQLite format 3", b"7\x7f\x06"  # beginnings of a record and of its write-ahead log
+LARGE: Final = 2**28  # bytes that any file may take
 _DENSE: Final = 100  # bytes that each byte of a larger file may take
 
 
@@ -50,25 +51,30 @@ def check_density(n_bytes: int, path: str | os.PathLike[str]) -> None:
     Raises:
         ValueError: the content would take more than 256 MB, and more than 100 times the size of the file.
     """
-    if n_bytes > max(_LARGE, _DENSE * os.path.getsize(path)):
+    if n_bytes > max(LARGE, _DENSE * os.path.getsize(path)):
         raise ValueError(f"it would take {n_bytes} bytes of memory, far more than the {os.path.getsize(path)} it has")
 
 
 @contextmanager
-def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
+def replacing(path: str | os.PathLike[str], *, record: bool = False) -> Iterator[Path]:
     """Path of a temporary file next to ``path``. The block writes this file, which replaces ``path`` at the end.
 
-    Even after a power cut, ``path`` holds the old file or the whole new one. An error removes the temporary file.
+    Even after a power cut, ``path`` holds the old file or the whole new one. An error removes the temporary file. A
+    link stays, and the file to which it leads is replaced.
+
+    Args:
+        path: file to write.
+        record: whether the file may replace a record.
 
     Raises:
-        OSError: ``path`` is a directory, or cannot be written.
+        OSError: ``path`` is a directory, a pipe, a device or a record, or cannot be written.
     """
-    partial = _partial(Path(path))
+    target, partial = _places(path, record)
     try:
         yield partial
         with open(partial, "rb+") as file:
             os.fsync(file.fileno())
-        os.replace(partial, path)
+        os.replace(partial, target)
     finally:
         partial.unlink(missing_ok=True)
 
@@ -77,18 +83,29 @@ def check_writable(path: str | os.PathLike[str]) -> None:
     """Refuse a file that ``replacing`` could not write, before the work for its content begins.
 
     Raises:
-        OSError: ``path`` is a directory, or cannot be written.
+        OSError: see ``replacing``.
     """
-    partial = _partial(Path(path))
+    _, partial = _places(path)
     partial.touch()
     partial.unlink()
 
 
-def _partial(path: Path) -> Path:
-    """Path of the temporary file next to ``path``."""
-    if path.is_dir():
+def is_record(path: Path) -> bool:
+    """Whether a file is an SQLite file or the write-ahead log of one."""
+    with path.open("rb") as file:
+        return file.read(16).startswith(_RECORD)
+
+
+def _places(path: str | os.PathLike[str], record: bool = False) -> tuple[Path, Path]:
+    """The file that ``path`` is or to which it leads, and the temporary file next to it."""
+    target = Path(os.path.realpath(path))
+    if target.is_dir():
         raise IsADirectoryError(f"{path} is a directory; was the name of the file left out?")
-    return path.with_name(f"{path.name}.{os.getpid()}.part")
+    if os.path.exists(path):
+        check_regular(path)
+        if not record and is_record(target):
+            raise OSError(f"{path} is the record of a run, which no other output replaces; choose another file")
+    return target, target.with_name(f"{target.name}.{os.getpid()}.part")
 
 
 def write_bytes(path: str | os.PathLike[str], content: bytes) -> None:

@@ -97,14 +97,15 @@ def check_point(name: str, value: ArrayLike, dim: int, hint: str = "") -> Array:
     return array
 
 
-def check_count(name: str, value: object, least: int) -> int:
-    """``value``, a whole number of Python or numpy that is ``least`` or more, as int.
+def check_count(name: str, value: object, least: int, most: float = np.inf) -> int:
+    """``value``, a whole number of Python or numpy from ``least`` to ``most``, as int.
 
     Raises:
         ValueError: any other value, True and False included.
     """
-    if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < least:
-        raise ValueError(f"{name} must be a whole number >= {least}, got {_in_short(value)}")
+    if not isinstance(value, int | np.integer) or isinstance(value, bool) or not least <= value <= most:
+        wanted = f">= {least}" if most == np.inf else f"from {least} to {most}"
+        raise ValueError(f"{name} must be a whole number {wanted}, got {_in_short(value)}")
     return int(value)
 
 

@@ -12,7 +12,7 @@ from difflib import get_close_matches
 from math import pi
 from typing import Final
 
-_RANGE: Final = re.compile(r"(-?\d+\.?\d*):(-?\d+\.?\d*)")
+_RANGE: Final = re.compile(r"(-?\d+\.?\d*):(-?\d+\.?\d*)", re.ASCII)
 
 
 def units_from(text: str) -> dict[str, str]:

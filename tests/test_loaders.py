@@ -3,15 +3,30 @@
 import io
 import os
 import zipfile
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
 
+from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
 from sgimd_torch.demonstrations.columns import ColumnNames
 from sgimd_torch.demonstrations.text import read_text
+from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import Benchmark, load_benchmark, save_benchmark
-from sgimd_torch.files import checksum, make_folder, read_npz, replacing, write_bytes, write_npz, write_text
+from sgimd_torch.files import (
+    check_writable,
+    checksum,
+    make_folder,
+    read_npz,
+    replacing,
+    write_bytes,
+    write_npz,
+    write_text,
+)
+from sgimd_torch.record import Record
+from sgimd_torch.record.saving import save_life
+from sgimd_torch.runs.past import read_csv
 from sgimd_torch.spaces import Demonstration
 
 LESSON = Demonstration(np.zeros(0), np.arange(3.0), np.ones((3, 2)), np.zeros(2))
@@ -126,6 +141,41 @@ def test_a_file_is_replaced_and_nothing_else_is_left(tmp_path, write):
     assert os.listdir(tmp_path) == ["saved"]
 
 
+@pytest.mark.parametrize("write", WRITERS)
+def test_a_link_stays_and_no_pipe_device_or_record_is_replaced(tmp_path, write):
+    (tmp_path / "far").mkdir()
+    (tmp_path / "link").symlink_to("far/saved")
+    for _ in range(2):  # the file to which a link leads may be missing
+        write(tmp_path / "link")
+        assert (tmp_path / "link").is_symlink()
+        assert os.listdir(tmp_path / "far") == ["saved"]
+        (tmp_path / "far/saved").write_text("old")
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "device").symlink_to(os.devnull)
+    Record.make(tmp_path / "run.sqlite", (0, 1, 1), {"settings": {}}).close()
+    Record.make(tmp_path / "life.sqlite", (0, 1, 1), {}).close()
+    (tmp_path / "run.sqlite-wal").write_bytes(bytes.fromhex("377f0682"))
+    for name in ("pipe", "device", "run.sqlite", "life.sqlite", "run.sqlite-wal"):
+        before = [os.stat(tmp_path / name).st_ino, os.stat(tmp_path / name).st_mtime_ns]
+        what = "a pipe or a device, not a file" if name in ("pipe", "device") else "the record of a run"
+        for use in (write, check_writable):
+            with pytest.raises(OSError, match=f"{name} is {what}"):
+                use(tmp_path / name)
+        assert [os.stat(tmp_path / name).st_ino, os.stat(tmp_path / name).st_mtime_ns] == before
+    assert not [name for name in os.listdir(tmp_path) if name.endswith(".part")]
+
+
+def test_a_life_replaces_a_life_but_no_run(tmp_path):
+    arm = PlanarArm(2)
+    for about in ({}, {"settings": {}}):
+        path = tmp_path / f"{len(about)}.sqlite"
+        Record.make(path, (0, 2, 2), about).close()
+        with pytest.raises(OSError, match="is the record of a run") if about else nullcontext():
+            save_life(practice(arm, 0), path)
+        with Record(path) as record:
+            assert ("settings" in record.about) == bool(about)
+
+
 def test_a_file_whose_writing_fails_stays_as_it_was(tmp_path):
     path = tmp_path / "film.mp4"
     path.write_text("old")
@@ -176,10 +226,28 @@ def test_a_benchmark_that_cannot_be_is_refused_in_few_words_and_not_saved(tmp_pa
     assert len(str(raised.value)) < 400
 
 
-@pytest.mark.parametrize(
-    "load", [load_benchmark, load_demonstrations, checksum, lambda path: read_text(path, ColumnNames(("a",), ("x",)))]
-)
+READERS = [load_benchmark, load_demonstrations, checksum, read_csv]
+
+
+@pytest.mark.parametrize("load", [*READERS, lambda path: read_text(path, ColumnNames(("a",), ("x",)))])
 def test_a_named_pipe_is_refused_and_keeps_nobody_waiting(tmp_path, load):
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(OSError, match="pipe is a pipe or a device, not a file"):
         load(tmp_path / "pipe")
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"x,y\n" + b"1" * 200_000, "is no csv file: field larger than field limit"),
+        (b"x\xff,y", "is no csv file: 'utf-8' codec can't decode"),
+        (None, "has 300000000 bytes, more than the 268435456 that such a table may have"),
+    ],
+)
+def test_a_table_of_absurd_size_is_refused_by_name(tmp_path, content, said):
+    path = tmp_path / "goals.csv"
+    path.write_bytes(content or b"")
+    if content is None:
+        os.truncate(path, 300_000_000)  # it takes no room on the disk
+    with pytest.raises(ValueError, match=rf"goals\.csv {said}"):
+        read_csv(path)

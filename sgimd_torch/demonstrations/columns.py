@@ -19,8 +19,8 @@ import numpy as np
 
 from sgimd_torch.spaces import Array, Demonstration
 
-NUMBER: Final = re.compile(r"[+-]?(\d+(\.\d*|,\d+)?|[.,]\d+)([eE][+-]?\d+)?")
-_NAME: Final = re.compile(r"(?P<column>[^\[\]]+)(\[(?P<first>\d+)(?P<slice>:(?P<end>\d+)?)?\])?")
+NUMBER: Final = re.compile(r"[+-]?(\d+(\.\d*|,\d+)?|[.,]\d+)([eE][+-]?\d+)?", re.ASCII)
+_NAME: Final = re.compile(r"(?P<column>[^\[\]]+)(\[(?P<first>\d+)(?P<slice>:(?P<end>\d+)?)?\])?", re.ASCII)
 
 
 @dataclass(frozen=True)

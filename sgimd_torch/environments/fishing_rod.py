@@ -71,7 +71,7 @@ class FishingRod:
         self.outcome_noise = 1.15 * noise  # m; scripts/check_physics.py measures 1.15 m for each s of motor noise
         windy = max_wind > 0
         self.contexts = Box.cube(-max_wind, max_wind, int(windy), names=("wind (N)",) * windy)
-        threads = None if threads is None else check_count("threads", threads, 1)
+        threads = None if threads is None else check_count("threads", threads, 1, 1024)
         self._caster = Caster(MODEL, (JOINT_RANGES.low + JOINT_RANGES.high) / 2, threads)
         self.model = self._caster.model
         self._draws = len(self._times(DURATIONS[1] + HOLD))  # number of draws of the motor noise per joint

@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import partial
 from importlib import import_module
+from pathlib import Path
 from typing import Any, ClassVar, Final
 
 import numpy as np
@@ -82,7 +83,7 @@ class LeRobotArm:
         *,
         port: str = "",
         robot_id: str = "",
-        model: str = "",
+        model: str | Path = "",
         outcome: str = "",
         seen_by: str = "",
         units: str = "",

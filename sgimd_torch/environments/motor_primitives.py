@@ -27,7 +27,7 @@ class GaussianPrimitive(Primitive):
         sharpness: factor s in sigma = s / delta^2 of four knots; of more knots sigma is larger, so that neighbours
             overlap alike. A factor below 5 makes the fit of eq. (6) ill-conditioned, a factor above 12 makes movements
             jerky.
-        n_knots: number of knots of each joint, at least 2.
+        n_knots: number of knots of each joint, from 2 to 100.
         start: ``(n_joints,)`` posture in which every movement begins, a knot before those of theta; None: movements
             begin near their first knot.
         speeds, accelerations: ``(n_joints,)`` limits (rad/s and rad/s^2), inf for none; a movement that would exceed
@@ -35,7 +35,7 @@ class GaussianPrimitive(Primitive):
 
     Raises:
         ValueError: the durations do not satisfy 0 < shortest < longest, the sharpness is not above 0, there are
-            fewer than 2 knots, or the start lies outside the ranges.
+            too few or too many knots, or the start lies outside the ranges.
     """
 
     def __init__(
@@ -55,7 +55,7 @@ class GaussianPrimitive(Primitive):
             raise ValueError(f"sharpness must be above 0, got {sharpness}")
         self.joints = self.ranges = joints
         self.durations = durations
-        self.n_knots = check_count("n_knots", n_knots, 2)
+        self.n_knots = check_count("n_knots", n_knots, 2, 100)
         self.policies = Box.cube(0.0, 1.0, joints.dim * n_knots + 1)
         self.start = None if start is None else joints.check("start", start, "is it in the ranges?")
         self.speeds, self.accelerations = (np.broadcast_to(limits, joints.dim) for limits in (speeds, accelerations))

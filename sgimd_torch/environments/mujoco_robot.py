@@ -46,6 +46,7 @@ LOOKED: Final = 32  # number of random movements that the look before the first 
 MOVED: Final = 1e-3  # m or rad, shift of the measured place that counts as moved
 FEWEST: Final = 10  # number of random movements that must move the measured place
 TREMBLE: Final = 1e-6  # m or rad; an object at rest trembles less, which must not look like an effect of a movement
+MOST_STEPS: Final = 100_000  # largest number of timesteps of a movement
 _BLOCK: Final = 32  # number of movements simulated in parallel
 _STATE: Final = mujoco.mjtState.mjSTATE_FULLPHYSICS
 _FRAMES: Final = 25.0  # drawings of a movement per second
@@ -83,7 +84,7 @@ class MujocoRobot:
         outcome_noise: standard deviation of outcomes if a movement is repeated; None for what ``noise`` makes of random
             movements, at least 1e-6.
         durations: shortest and longest duration of a movement (s).
-        n_knots: number of knots of each joint, after the start.
+        n_knots: number of knots of each joint, after the start, from 2 to 100.
         settle: time (s) between the end of a movement and its outcome.
         noise: standard deviation of the motor noise, relative to the range of each command. It shifts a command by a
             random amount throughout a movement.
@@ -138,9 +139,12 @@ class MujocoRobot:
         for name, value in (("settle", settle), ("noise", noise)):
             if not 0 <= value < np.inf:
                 raise ValueError(f"{name} must be finite and >= 0, got {value}")
+        threads = check_count("threads", threads, 1, 1024)
         path = file_of(model)
         loaded = load_model(path, joints, servos, keyframe, posture)
         self.model, self.remarks, self.files = loaded.model, loaded.remarks, files_of(path)
+        self._longest, self._settle, self._displacement, self.noise = durations[1], settle, displacement, noise
+        self._n_steps(self._longest)
         commands, self._actuators, said = commands_box(self.model, joints)
         self.remarks += said
         self.joints = positions(self.model, self._actuators)
@@ -148,7 +152,7 @@ class MujocoRobot:
         make = controller or partial(
             GaussianPrimitive,
             durations=durations,
-            n_knots=check_count("n_knots", n_knots, 2),
+            n_knots=n_knots,
             start=commands.clip(self.start) if self.joints else None,
             speeds=[loaded.speeds.get(name, np.inf) for name in self.joints] or np.inf,
             accelerations=[loaded.accelerations.get(name, np.inf) for name in self.joints] or np.inf,
@@ -164,8 +168,6 @@ class MujocoRobot:
         for place in self._places:
             check_moved(self.model, place, self._actuators)
         self._hand = hand_of(self.model, self._places[0], self.bodies)
-        self._longest, self._settle, self._displacement, self.noise = durations[1], settle, displacement, noise
-        threads = check_count("threads", threads, 1)
         self._pool = rollout.Rollout(nthread=threads if threads > 1 else 0)
         self._data = [mujoco.MjData(self.model) for _ in range(threads)]
         names = [name for place in self._places for name in place.names]
@@ -322,7 +324,22 @@ class MujocoRobot:
 
     def _still(self, lasts: float) -> Array:
         """``(n_steps, nu)``, the commands that hold the start configuration for a movement of ``lasts`` s."""
-        return np.tile(self._held, (int(np.ceil((lasts + self._settle) / self.model.opt.timestep)), 1))
+        return np.tile(self._held, (self._n_steps(lasts), 1))
+
+    def _n_steps(self, lasts: float) -> int:
+        """Number of timesteps of a movement of ``lasts`` s.
+
+        Raises:
+            ValueError: there are more than ``MOST_STEPS``, which would take too long.
+        """
+        timestep = self.model.opt.timestep
+        n = (lasts + self._settle) / timestep if timestep > 0 else np.inf
+        if not n <= MOST_STEPS:
+            raise ValueError(
+                f"a movement of {lasts:g} s and settle {self._settle:g} s take {n:.3g} steps at the model's timestep "
+                f"{timestep:g}, more than {MOST_STEPS}; durations, settle and timestep are in s, are they in ms?"
+            )
+        return int(np.ceil(n))
 
     def _simulate(self, contexts: Array, commands: Sequence[Array]) -> list[Array | None]:
         """States of each movement, the first one before its first step; None if the simulation diverged."""

@@ -8,17 +8,18 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from sgimd_torch.changes import check_watcher
 from sgimd_torch.environments.protocol import Environment, FromFiles
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.learner import Learner
+from sgimd_torch.memory import Memory
 from sgimd_torch.options.built import call_checked
 from sgimd_torch.options.catalogue import function_of, load_word
 from sgimd_torch.options.config import FILES, OWN, Config
 from sgimd_torch.parts import Demonstrator, Inverse, Teacher
-from sgimd_torch.runs.at_once import check_at_once
 from sgimd_torch.runs.tasks import Task, benchmark_of
 from sgimd_torch.spaces import stream
 
@@ -34,6 +35,7 @@ class RunParts:
         teacher: teacher who demonstrates without being asked; None: no teacher.
         teachers: teachers who are asked, by name.
         benchmark: goals of evaluations.
+        prior: movements of another robot with which the learner begins; None: there are none.
         data: checksums of the files that were read.
         notes: messages for the user.
     """
@@ -44,6 +46,7 @@ class RunParts:
     teacher: Teacher | None
     teachers: Mapping[str, Demonstrator]
     benchmark: Benchmark
+    prior: Memory | None
     data: dict[str, str | None]
     notes: Sequence[str]
 
@@ -63,8 +66,12 @@ class RunParts:
         return inverses
 
 
-def build(config: Config) -> RunParts:
+def build(config: Config, record: Path | None = None) -> RunParts:
     """Build the parts of a run; nothing is executed yet.
+
+    Args:
+        config: settings of the run.
+        record: record of the run, which keeps the movements of --begin-with; None: the run is not on disk.
 
     Raises:
         ValueError: a part refuses an option, or a file does not fit the robot.
@@ -73,7 +80,10 @@ def build(config: Config) -> RunParts:
     task = task_of(config)
     robot, readers = task.environment, dict[str, Callable[..., Any]](benchmark=benchmark_of)
     config = config.with_found(robot.found_options if isinstance(robot, FromFiles) else {})
-    check_at_once(robot, config.at_once)
+    if config.at_once > 1:
+        from sgimd_torch.runs.at_once import check_at_once  # most runs have one robot
+
+        check_at_once(robot, config.at_once)
     own = [config.constructor("teacher")] if config.teaching == "teacher" else []
     asked = {word: load_word("teachers", word) for word in config.asked}
     if any(map(_needs_demonstrations, (*own, *asked.values()))):
@@ -83,13 +93,14 @@ def build(config: Config) -> RunParts:
     if config.begin_with is not None:
         from sgimd_torch.runs.past import past_of  # few runs begin with a past
 
-        readers["begin_with"] = past_of
+        readers["begin_with"] = partial(past_of, record=record)
     contents, notes = dict[str, Any](), list[str]()
     data: dict[str, str | None] = {f"{name}_crc32": None for name in FILES}
     for name, read in readers.items():
         contents[name], remarks, data[f"{name}_crc32"] = read(task, config[name])
         notes += remarks
-    given: dict[str, Any] = {"prior": contents["begin_with"]} if "begin_with" in contents else {}
+    prior = contents.get("begin_with")
+    given: dict[str, Any] = {} if prior is None else {"prior": prior}
     teacher, teachers = None, dict[str, Demonstrator]()
     if config.teaching:
         from sgimd_torch.runs.tasks.taught import correspondence_of
@@ -107,7 +118,7 @@ def build(config: Config) -> RunParts:
     if config.until is not None and not learner.inverse.says_how_sure:
         name = type(learner.inverse).__name__
         raise ValueError(f"--until needs an inverse model that says how sure it is, such as process; {name} does not")
-    parts = RunParts(config, task, learner, teacher, teachers, contents["benchmark"], data, notes)
+    parts = RunParts(config, task, learner, teacher, teachers, contents["benchmark"], prior, data, notes)
     assert parts.inverses  # made here, so that their remarks are among the notes
     if config.checkpoints and not learner.problem.trained:
         raise ValueError("--checkpoints true needs a forward model, such as --inverse model")

@@ -25,14 +25,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     program = ["sgimd"] if Path(sys.argv[0]).name == "sgimd" else [sys.executable, "-m", "sgimd_torch"]
     again = [*program, "run", *argv, *([] if resume else ["--resume"])]
     with loading():
-        from sgimd_torch.runs.directory import (
-            RUN_FILE,
-            build_again,
-            holds_run,
-            with_found_earlier,
-        )  # loaded late, so --help is fast
+        from sgimd_torch.runs.directory import build_again, record_of, with_found_earlier  # late, so --help is fast
         from sgimd_torch.runs.run import run_one
-    parts = build_again(with_found_earlier(config), recorded=resume and holds_run(config.directory / RUN_FILE))
+    parts = build_again(with_found_earlier(config), record_of(config) if resume else None)
     with Stopping() as stopping:
         print(run_one(parts, stopping, resume=resume, again=shlex.join(again)))
     return 0

@@ -11,11 +11,12 @@ from __future__ import annotations
 import importlib.util
 import json
 import math
+import os
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, Final, NamedTuple, Self
+from typing import Any, Final, NamedTuple, Self, get_args
 
 from sgimd_torch.options.catalogue import ROD, TAUGHT_BY, WORDS, did_you_mean, load_word, word_of
 from sgimd_torch.options.signature import Option, as_text, options_of, parameters_of, parsed
@@ -25,6 +26,7 @@ FILES: Final = ("benchmark", "demonstrations", "begin_with")  # options that nam
 OF_TEACHING: Final = ("demonstrations", "teacher", "teachers", "social")  # options of taught algorithms
 LEAST: Final = {"seed": 0, "movements": 1, "repeats": 0, "failures": 1, "at_once": 1, "evaluate_at": 1, "floor_at": 1}
 """Least value of an option, or of each of its numbers."""
+MOST_MOVEMENTS: Final = 10**8
 
 
 @dataclass(frozen=True)
@@ -94,6 +96,8 @@ class Config:
             value = getattr(self, name)
             if value is not None and min(value if isinstance(value, tuple) else (value,), default=least) < least:
                 raise ValueError(f"{name} must be at least {least}, got {as_text(value)}")
+        if self.movements > MOST_MOVEMENTS:
+            raise ValueError(f"movements must be at most {MOST_MOVEMENTS}, got {self.movements}")
         if self.until is not None and not 0 < self.until < math.inf:
             raise ValueError(f"until must be an error above 0, in the unit of T, got {self.until}")
         if self.repeats == 1:
@@ -162,8 +166,12 @@ class Config:
         return json.loads(json.dumps(self.values, default=str))
 
     @classmethod
-    def from_settings(cls, settings: Mapping[str, Any]) -> Self:
+    def from_settings(cls, settings: Mapping[str, Any], folder: Path = Path()) -> Self:
         """The run with these values by name, as json values or as a user types them; others have their defaults.
+
+        Args:
+            settings: values by name.
+            folder: folder in which relative paths begin, if something is there; else they begin in the present one.
 
         Raises:
             ValueError: a value is of another type or out of its range, or an option does not exist.
@@ -176,6 +184,8 @@ class Config:
             elif isinstance(value, str) and not isinstance(kind, str | None):
                 try:
                     values[name] = parsed(value, kind)
+                    if Path in (kind, *get_args(kind)) and value and os.path.exists(folder / value):
+                        values[name] = type(values[name])(folder / value)
                 except ValueError as error:
                     raise ValueError(f"--{dashed(name)} {error}") from error
         parts = {name: value for name, value in values.items() if name not in RUN}

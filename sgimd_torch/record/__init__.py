@@ -19,7 +19,7 @@ import sqlite3
 import zlib
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final, Self
 
@@ -43,14 +43,16 @@ from sgimd_torch.spaces import Demonstration
 
 __all__ = ["DERIVED", "Dims", "Record", "ReplayError", "Row", "RunError", "layout"]
 
-_PATIENCE: Final = 0.1  # s, longest time that a commit waits for readers of other programs
+_LOCAL: Final = {"ext2", "ext3", "ext4", "xfs", "btrfs", "tmpfs", "overlay", "zfs", "f2fs", "bcachefs"}
+"""File systems of one machine."""
 _ROWS_AT_ONCE: Final = 4096  # number of rows that one query reads
 
 
 class Record:
     """An existing record, open for reading and, on request, for writing; a context manager.
 
-    A reader copies the file into its memory at once. So it keeps no lock, and sees one state of the file.
+    A reader copies the file into its memory at once. So it keeps no lock, and sees one state of the file. A writer
+    keeps a write-ahead log beside the file until ``close``, so no reader delays a commit.
 
     Args:
         path: SQLite file.
@@ -73,8 +75,9 @@ class Record:
         self._numbers: dict[bytes, int] = {}  # number of each demonstration, from 0, by its content
         self._failure: Exception | None = None  # the error of a failed write
         self._connection = _connect(self.path, write)
+        self._log_waits = write and _shares_memory(self.path)  # for the first commit, which is to begin it
         try:
-            with self._translated_errors():
+            with self.translated_errors():
                 self._lock() if write else self._copy()
                 self._open()
                 for table in layout(self.dims) if write else ():  # nothing is added to a damaged record
@@ -109,7 +112,10 @@ class Record:
         self.close()
 
     def close(self) -> None:
-        """Close the file; uncommitted rows are lost."""
+        """Close the file, a writer without a write-ahead log; uncommitted rows are lost."""
+        with suppress(sqlite3.Error):  # where another program has the file open, the log stays until that ends
+            self._connection.rollback()
+            self._connection.execute("PRAGMA journal_mode = DELETE")
         self._connection.close()
 
     def rows(self, table: str) -> Iterator[Row]:
@@ -119,9 +125,9 @@ class Record:
             RunError: a row was changed, or rows are missing or added; all rows before it have been yielded.
         """
         number = 0
-        # No cursor stays open between yields, because a writer cannot commit while one is open.
+        # No cursor stays open between yields, because the log cannot begin while one is open.
         next_rows = f"SELECT rowid, * FROM {table} WHERE rowid > ? ORDER BY rowid LIMIT {_ROWS_AT_ONCE}"
-        with self._translated_errors():
+        with self.translated_errors():
             while rows := self._connection.execute(next_rows, (number,)).fetchall():
                 for rowid, *row, checksum in rows:
                     number += 1
@@ -155,7 +161,7 @@ class Record:
 
     def replace_rows(self, table: str, rows: Iterable[Sequence[Any]]) -> None:
         """Replace all rows of a table."""
-        with self._translated_errors(writing=True):
+        with self.translated_errors(writing=True):
             self._connection.execute(f"DELETE FROM {table}")
         self._n_rows[table] = 0
         self._append(table, [plain(row) for row in rows])
@@ -164,21 +170,26 @@ class Record:
         """Bring all new rows and ``about`` to the disk, or nothing.
 
         Returns:
-            Whether the rows are on the disk; if another program is reading the file, they stay for the next commit.
+            Whether the rows are on the disk. Without a write-ahead log, which the first commit begins if the file
+            system allows it, the rows wait for the next commit while another program is reading the file.
 
         Raises:
             OSError: the disk is full or cannot be written; earlier commits remain.
             RunError: another process has written in the meantime.
         """
         self.replace_rows("about", _about_rows(self.about, self._n_rows))
-        with self._translated_errors(writing=True):
-            self._connection.execute(f"PRAGMA busy_timeout = {int(1000 * _PATIENCE)}")
+        with self.translated_errors(writing=True):
             try:
                 self._connection.execute("COMMIT")
             except sqlite3.OperationalError as error:
                 if error.sqlite_errorcode != sqlite3.SQLITE_BUSY:
                     raise
                 return False
+            if self._log_waits:
+                with suppress(sqlite3.OperationalError):  # a program that is reading delays it to the next commit
+                    self._connection.execute("PRAGMA journal_mode = WAL")
+                    self._log_waits = False
+                    self._version = self._connection.execute("PRAGMA data_version").fetchone()  # the log changed it
             self._lock()
         return True
 
@@ -197,7 +208,7 @@ class Record:
         if rows:
             complete = _with_checksums(rows, self._n_rows[table])
             marks = ", ".join("?" * len(complete[0]))
-            with self._translated_errors(writing=True):
+            with self.translated_errors(writing=True):
                 self._connection.executemany(f"INSERT INTO {table} VALUES ({marks})", complete)
             self._n_rows[table] += len(rows)
 
@@ -237,7 +248,7 @@ class Record:
             raise RunError("another process has written to it")
 
     @contextmanager
-    def _translated_errors(self, *, writing: bool = False) -> Iterator[None]:
+    def translated_errors(self, *, writing: bool = False) -> Iterator[None]:
         """Turn errors of SQLite, and errors from unexpected values, into RunError or OSError with the path."""
         if self._failure is not None:
             raise self._failure
@@ -267,9 +278,21 @@ def _connect(path: Path, write: bool) -> sqlite3.Connection:
         # Readers need mode=rw, too, to clean up after a killed writer. SQLite still opens a read-only file for reading.
         # check_same_thread=False: teaching by hand opens the record in one thread and later uses it in another.
         place, patience = f"{path.resolve().as_uri()}?mode=rw", 0.5 if write else 10.0
+        if not (write or os.access(path.parent, os.W_OK) or path.with_name(f"{path.name}-wal").exists()):
+            place += "&immutable=1"  # else SQLite would make a log for the record of a run that was killed
         return sqlite3.connect(place, uri=True, isolation_level=None, timeout=patience, check_same_thread=False)
     except (sqlite3.Error, OSError) as error:
         raise RunError(f"{path} cannot be opened: {error}") from error
+
+
+def _shares_memory(path: Path) -> bool:
+    """Whether all programs that can open a file run on this machine: a write-ahead log needs memory that they share."""
+    try:
+        mounts = [line.split()[1:3] for line in Path("/proc/mounts").read_text(encoding="utf-8").splitlines()]
+    except OSError:  # only Linux has this list
+        return True
+    kinds = {place: kind for place, kind in mounts if path.resolve().is_relative_to(place)}
+    return kinds.get(max(kinds, key=len, default="")) in _LOCAL
 
 
 def _tables(dims: Dims) -> dict[str, str]:

@@ -49,6 +49,7 @@ def layout(dims: Dims) -> dict[str, list[str]]:
     columns = {
         "about": ["name TEXT", "value TEXT"],
         "events": ["movement INTEGER", "kind TEXT", "origin TEXT", *context, *theta, *goal, *outcome, *words],
+        "prior": [*context, *theta, *outcome],
         "demonstrations": [*context, *outcome, "n_joints INTEGER", "times BLOB", "trajectory BLOB"],
         "goals": ["goal INTEGER", *goal],
         "evaluations": [*evaluated, *(f"{name} REAL" for name in numbers), "goals_met INTEGER"],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 
 from sgimd_torch.files import replacing
 from sgimd_torch.learner import Learner
@@ -21,7 +22,7 @@ def save_life(learner: Learner, path: str | os.PathLike[str]) -> None:
 
     Raises:
         ValueError: exemplars entered the memory without `Learner.add`, so no learner could repeat this life.
-        OSError: ``path`` is a directory, or cannot be written.
+        OSError: ``path`` is a directory, a pipe, a device or a run, or cannot be written.
     """
     counted = {Kind.MOVED, Kind.ADDED, *([Kind.SHOWN] if learner.social and learner.social.remembers else [])}
     lived = learner.begun + sum(event.kind in counted for event in learner.events())
@@ -30,8 +31,11 @@ def save_life(learner: Learner, path: str | os.PathLike[str]) -> None:
             f"the memory has {len(learner.memory)} exemplars, but {lived} were lived; were some added without "
             "learner.add(), which records them?"
         )
+    with suppress(RunError), Record(path) as before:
+        if "settings" in before.about:
+            raise OSError(f"{path} is the record of a run, which no life replaces; choose another file")
     about = {"begun": learner.begun}
-    with replacing(path) as partial, Record.make(partial, learner.problem.dims, about) as record:
+    with replacing(path, record=True) as partial, Record.make(partial, learner.problem.dims, about) as record:
         for event in learner.events():
             record.add(event)
         record.commit()

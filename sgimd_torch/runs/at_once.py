@@ -11,13 +11,15 @@ import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from typing import Any
+from functools import partial
+from typing import Any, Final
 
-from sgimd_torch.environments.protocol import BatchEnvironment, Environment
+from sgimd_torch.environments.protocol import BatchEnvironment, Environment, SimulationError, reason_of
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.session import Execute, live
 from sgimd_torch.spaces import Array, Failure
 
+ONE: Final = "is one robot all there is?"
 _robot: Execute  # executes movements in this process, if it is one of several
 
 
@@ -52,7 +54,8 @@ def executing(
 def in_processes(make: Callable[[], Any], seed: int, processes: int) -> Iterator[Execute]:
     """The function that executes movements in this number of ``processes``, which end with the block.
 
-    Each process makes an environment, or a `Task`, by ``make``. RuntimeError when it executes: a process has ended.
+    Each process makes an environment, or a `Task`, by ``make``. SimulationError when it executes: a process could not
+    make it, or has ended.
     """
     import multiprocessing  # modules that most runs do not need
     from concurrent.futures import ProcessPoolExecutor
@@ -61,17 +64,21 @@ def in_processes(make: Callable[[], Any], seed: int, processes: int) -> Iterator
     # A forked process would share the locks of this one's threads.
     spawning = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(processes, spawning, _begin, (make, seed))
+    workers = pool._processes  # filled as movements come
 
     def execute(indices: Sequence[int], contexts: Sequence[Array], thetas: Sequence[Array]) -> list[Array | Failure]:
         try:
             return list(pool.map(_execute, indices, contexts, thetas))
         except BrokenProcessPool as error:
-            raise RuntimeError("a process that executes movements has ended; is one robot all there is?") from error
+            pool.shutdown()  # it ends the other processes by SIGTERM
+            codes = [process.exitcode for process in workers.values()]
+            code = next((code for code in codes if code != -signal.SIGTERM), -signal.SIGTERM)
+            raise SimulationError(f"a process that executes movements ended with exit code {code}; {ONE}") from error
 
     try:
         yield execute
     except BaseException:  # after a second Ctrl-C, too, nothing waits for a robot that hangs
-        for process in list(pool._processes.values()):
+        for process in list(workers.values()):
             process.kill()
         raise
     finally:
@@ -86,8 +93,15 @@ def _begin(make: Callable[[], Any], seed: int) -> None:
 
     parent = parent_process()
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
-    made = make()
-    _robot = live(made.environment if isinstance(made, Task) else made, seed)
+    try:
+        made = make()
+        _robot = live(made.environment if isinstance(made, Task) else made, seed)
+    except (Exception, SystemExit) as error:
+        _robot = partial(_fail, f"a process that executes movements cannot make its robot: {reason_of(error)}; {ONE}")
+
+
+def _fail(reason: str, *_: object) -> list[Array | Failure]:
+    raise SimulationError(reason)
 
 
 def _execute(index: int, context: Array, theta: Array) -> Array | Failure:

@@ -16,6 +16,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+
 import sgimd_torch
 from sgimd_torch.environments.protocol import Environment, FromFiles
 from sgimd_torch.files import checksum, make_folder
@@ -62,6 +64,7 @@ def open_run(parts: RunParts, *, resume: bool) -> tuple[Record, list[str]]:
     path, notes = config.directory / RUN_FILE, list[str]()
     about: dict[str, Any] = {
         "settings": config.settings,
+        "folder": os.getcwd(),
         "files": parts.data,
         "versions": versions_of(parts),
         "robot": type(robot).__name__,
@@ -80,6 +83,9 @@ def open_run(parts: RunParts, *, resume: bool) -> tuple[Record, list[str]]:
         if resume:
             notes.append(f"{path.parent} holds no run yet: the run starts from the beginning")
         record = Record.make(path, dims, about)
+        if parts.prior is not None:
+            exemplars = parts.prior.contexts, parts.prior.thetas, parts.prior.outcomes
+            record.replace_rows("prior", np.concatenate(exemplars, axis=1).tolist())
     elif resume:
         record = _reopened(path, about, dims, parts, notes)
     else:
@@ -102,29 +108,46 @@ def with_found_earlier(config: Config) -> Config:
         return config
     with Record(config.directory / RUN_FILE) as record:
         before = record.about.get("settings", {})
-    own = {name: value for name, value in config.settings.items() if name.startswith("environment")}
-    if any(differ(before.get(name), own[name]) for name in own.keys() - names - {*NOT_COMPARED}):
+        others = differing(before, config.settings, record.about.get("folder", ""))
+    if any(name.startswith("environment") for name in {*others} & config.settings.keys() - names - {*NOT_COMPARED}):
         return config  # it is another robot's run
     earlier = {name: before[name] for name in names & before.keys() if name not in dict(config.parts)}
     return Config.from_settings({**config.settings, **earlier})
 
 
-def build_again(config: Config, *, recorded: bool = True) -> RunParts:
+def differing(before: Mapping[str, Any], now: Mapping[str, Any], folder: str) -> list[str]:
+    """Names of the settings that differ; relative paths of the settings ``before`` begin in ``folder``."""
+
+    def are_one_path(one: Any, other: Any) -> bool:
+        both = isinstance(one, str) and isinstance(other, str)
+        return both and os.path.realpath(os.path.join(folder, one)) == os.path.realpath(other)
+
+    pairs = {name: (before.get(name), now.get(name)) for name in (*now, *before)}
+    return [name for name, pair in pairs.items() if differ(*pair) and not are_one_path(*pair)]
+
+
+def record_of(config: Config) -> Path | None:
+    """The record of a run, if it is on disk."""
+    path = config.directory / RUN_FILE
+    return path if holds_run(path) else None
+
+
+def build_again(config: Config, record: Path | None) -> RunParts:
     """Build the parts of a run on disk; if this machine lacks the device that trained its model, the CPU trains it.
 
     Args:
         config: settings of the run.
-        recorded: whether the run is on disk. If not, a missing device is an error.
+        record: record of the run; None: the run is not on disk, so a missing device is an error.
 
     Raises:
         ValueError, FileNotFoundError: see ``build``.
     """
     try:
-        return build(config)
+        return build(config, record)
     except ValueError as error:
-        if not recorded or config.values.get(DEVICE, "auto") == "auto":
+        if record is None or config.values.get(DEVICE, "auto") == "auto":
             raise
-        parts = build(replace(config, parts={**dict(config.parts), DEVICE: "auto"}))
+        parts = build(replace(config, parts={**dict(config.parts), DEVICE: "auto"}), record)
         say(f"the CPU trains the forward model of this record: {error}")
         return parts
 
@@ -180,7 +203,7 @@ def _refuse_other(record: Record, about: dict[str, Any], dims: Dims) -> set[str]
     if "settings" not in record.about:
         raise RunError(f"{record.path} is a life that save_life wrote, not a run; choose another --out")
     before, now = ({**told["settings"], **told["files"]} for told in (record.about, about))
-    others = [name for name in dict.fromkeys((*now, *before)) if differ(before.get(name), now.get(name))]
+    others = differing(before, now, record.about.get("folder", ""))
     if changed := [name for name in others if name not in MAY_CHANGE]:
         raise RunError(
             f"{record.path.parent} belongs to another configuration: "

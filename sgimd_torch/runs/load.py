@@ -51,7 +51,7 @@ class OpenRun:
 
     def __init__(self, path: str | os.PathLike[str], *, trust: bool = False) -> None:
         self.recorded = read_run(path)
-        self.parts = build_again(config_of(self.recorded, trust=trust))
+        self.parts = build_again(config_of(self.recorded, trust=trust), Path(path) / RUN_FILE)
         self._episodes = repeated(self.parts.learner, Path(path) / RUN_FILE)
 
     def replay(self, movements: int | None = None) -> None:

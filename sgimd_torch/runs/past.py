@@ -8,12 +8,11 @@ from __future__ import annotations
 import csv
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
 from sgimd_torch.environments.protocol import Environment
-from sgimd_torch.files import checksum
+from sgimd_torch.files import LARGE, check_regular, checksum, is_record
 from sgimd_torch.learner.events import Kind
 from sgimd_torch.memory import Memory
 from sgimd_torch.options.signature import parsed
@@ -21,16 +20,16 @@ from sgimd_torch.record import Record, RunError
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.spaces import Array, Box, check_vector
 
-_SQLITE: Final = b"SQLite format 3"  # a record begins with it
 Exemplar = tuple[Array, Array, Array]
 
 
-def past_of(task: Task, path: Path) -> tuple[Memory, list[str], str]:
+def past_of(task: Task, path: Path, record: Path | None = None) -> tuple[Memory, list[str], str]:
     """The movements in a record, or in a csv file with columns ``context_0``, ``theta_0``, ``outcome_0`` and so on.
 
     Args:
         task: task of the run, whose robot must have the dimensions of these movements.
         path: record or csv file.
+        record: record of the run, if it is on disk. It has these movements, too, so the file may be gone.
 
     Returns:
         The movements, messages about them, and the checksum of the file.
@@ -39,10 +38,13 @@ def past_of(task: Task, path: Path) -> tuple[Memory, list[str], str]:
         ValueError: the file is damaged or has no movements, or its robot has other dimensions, units or bounds.
         OSError: the file cannot be read.
     """
-    robot, crc32 = task.environment, checksum(path)
-    with path.open("rb") as file:
-        recorded = file.read(len(_SQLITE)) == _SQLITE
-    exemplars = list(_recorded(path, robot) if recorded else _listed(path, robot))
+    robot, exemplars, crc32 = task.environment, list[Exemplar](), ""
+    if record is not None:
+        exemplars, crc32 = _kept(record, robot)
+    if not exemplars or path.exists():
+        crc32 = checksum(path)
+    if not exemplars:
+        exemplars = list(_recorded(path, robot) if is_record(path) else _listed(path, robot))
     if not exemplars:
         raise RunError(f"{path} holds no movements to begin with")
     contexts, thetas, outcomes = (np.stack(column) for column in zip(*exemplars, strict=True))
@@ -53,6 +55,15 @@ def past_of(task: Task, path: Path) -> tuple[Memory, list[str], str]:
     return memory, [f"begins with {len(memory)} movements of {path}, as far as they help"], crc32
 
 
+def _kept(path: Path, robot: Environment) -> tuple[list[Exemplar], str]:
+    """The movements with which a run of this robot began, and the checksum of the file from which they came."""
+    c, p, t = robot.contexts.dim, robot.policies.dim, robot.outcomes.dim
+    with Record(path) as record:
+        rows = np.array([*record.rows("prior")]) if record.dims == (c, p, t) else np.empty((0, c + p + t))
+        contexts, thetas, outcomes = np.split(rows.reshape(-1, c + p + t), (c, c + p), axis=1)
+        return [*zip(contexts, thetas, outcomes, strict=True)], record.about.get("files", {}).get("begin_with_crc32")
+
+
 def _recorded(path: Path, robot: Environment) -> Iterator[Exemplar]:
     """Exemplars of a record; a run says in which boxes, with which units."""
     boxes = {"contexts": robot.contexts, "policies": robot.policies, "outcomes": robot.outcomes}
@@ -60,8 +71,10 @@ def _recorded(path: Path, robot: Environment) -> Iterator[Exemplar]:
     with Record(path) as record:
         if record.dims != dims:
             raise RunError(f"{path} has dims {record.dims} of context, theta, outcome, this robot has {dims}")
-        for name, given in record.about.get("spaces", {}).items():
-            recorded, box = Box(*given), boxes[name]
+        with record.translated_errors():
+            spaces = {name: Box(*record.about["spaces"][name]) for name in boxes if "spaces" in record.about}
+        for name, recorded in spaces.items():
+            box = boxes[name]
             if recorded.unit != box.unit:
                 raise RunError(f"{name} of {path} are in {recorded.unit or 'no unit'}, here in {box.unit or 'no unit'}")
             if name != "outcomes" and not (
@@ -82,20 +95,36 @@ def _listed(path: Path, robot: Environment) -> Iterator[Exemplar]:
     """Exemplars of a csv file; other columns do not matter."""
     boxes = {"context": robot.contexts, "theta": robot.policies, "outcome": robot.outcomes}
     wanted = [[f"{name}_{k}" for k in range(box.dim)] for name, box in boxes.items()]
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except UnicodeDecodeError as error:
-        raise RunError(f"{path} is neither a record nor a csv file") from error
-    rows = csv.DictReader(lines)
-    heads = rows.fieldnames or ()
-    lacking = [name for names in wanted for name in names if name not in heads]
-    more = [f"{name}_{box.dim}" for name, box in boxes.items() if f"{name}_{box.dim}" in heads]
-    if lacking or more:
-        why = f"lacks the column {lacking[0]}" if lacking else f"has a column {more[0]}, so it is of another robot"
-        raise RunError(f"{path} {why}; this robot needs {', '.join(name for names in wanted for name in names)}")
-    for number, row in enumerate(rows, 2):
+    all_wanted = [name for names in wanted for name in names]
+    (_, heads), *rows = read_csv(path) or [(1, [])]
+    faults = [f"lacks the column {name}" for name in all_wanted if name not in heads]
+    faults += [f"has two columns {name}" for name in all_wanted if heads.count(name) > 1]
+    more = [f"{name}_{box.dim}" for name, box in boxes.items()]
+    faults += [f"has a column {name}, so it is of another robot" for name in more if name in heads]
+    if faults:
+        raise RunError(f"{path} {faults[0]}; this robot needs {', '.join(all_wanted)}")
+    for number, row in rows:
+        cells = dict(zip(heads, row, strict=False))
         try:
-            context, theta, outcome = (np.array([parsed(row[name] or "", float) for name in names]) for names in wanted)
+            numbers = ([parsed(cells.get(name, ""), float) for name in names] for names in wanted)
+            context, theta, outcome = map(np.array, numbers)
         except ValueError as error:
-            raise RunError(f"{path}: line {number} is no movement of {sum(map(len, wanted))} numbers") from error
+            raise RunError(f"{path}: line {number} is no movement of {len(all_wanted)} numbers") from error
         yield context, theta, outcome
+
+
+def read_csv(path: Path) -> list[tuple[int, list[str]]]:
+    """The rows of a table with commas that have any field, each with the number of its line, from 1.
+
+    Raises:
+        ValueError: the file is no such table, or has more than 256 MB.
+        OSError: there is no file, or it is a pipe or a device.
+    """
+    check_regular(path)
+    if path.stat().st_size > LARGE:
+        raise ValueError(f"{path} has {path.stat().st_size} bytes, more than the {LARGE} that such a table may have")
+    with path.open(encoding="utf-8", newline="") as file:
+        try:
+            return [(rows.line_num, row) for rows in [csv.reader(file)] for row in rows if row]
+        except (csv.Error, UnicodeDecodeError) as error:
+            raise ValueError(f"{path} is no csv file: {error}") from error

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import re
+import sys
 from array import array
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,9 +19,9 @@ from numpy.typing import NDArray
 from sgimd_torch.evaluation import OwnGoals
 from sgimd_torch.files import checksum
 from sgimd_torch.learner.events import Kind
-from sgimd_torch.options.config import FILES, OWN, Config, differ
+from sgimd_torch.options.config import FILES, OWN, Config
 from sgimd_torch.record import DERIVED, Record, RunError, layout
-from sgimd_torch.runs.directory import NOT_COMPARED, RUN_FILE, code_of, with_found_earlier
+from sgimd_torch.runs.directory import NOT_COMPARED, RUN_FILE, code_of, differing, with_found_earlier
 from sgimd_torch.spaces import Array, Box, Demonstration
 
 Columns = dict[str, np.ndarray]
@@ -34,7 +35,7 @@ class Run:
     Attributes:
         path: directory of the run.
         config: options by name.
-        versions, files, words: entries of the table ``about``, see docs/runs.md.
+        versions, files, words, folder: entries of the table ``about``, see docs/runs.md.
         robot: name of the environment's class.
         tolerance: distance, in the unit of T, at which a goal of the learner counts as met.
         spaces: boxes C, Pi and T, by the names "contexts", "policies" and "outcomes".
@@ -83,6 +84,7 @@ class Run:
     requests: Columns | None = None
     failed: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, np.bool_))
     tolerance: float = float("nan")
+    folder: str = ""
 
     @property
     def evaluation(self) -> dict[str, Array]:
@@ -153,34 +155,36 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         n = record.movements
     evaluated = derived["evaluations"]["movements"]
     is_empty = not demonstrations and not np.isfinite(arrays["outcomes"]).any()  # an empty memory is not evaluated
-    end, expected = about["ended_early"] or (settings["movements"], None)
-    finished = n == end and (settings["evaluate_at"] == [] or n in evaluated or is_empty)
-    return Run(
-        path=path,
-        config=settings,
-        versions=about["versions"],
-        files=about["files"],
-        robot=about["robot"],
-        words=about["words"],
-        tolerance=about.get("tolerance", float("nan")),
-        spaces={name: Box(*box) for name, box in about["spaces"].items()},
-        summary={
-            "movements": n,
-            "failed": int(arrays["failed"].sum()),
-            "finished": bool(finished),
-            "expected": expected,
-            **about.get("seconds", {}),
-        },
-        **arrays,
-        evaluations=_by_inverse(derived["evaluations"]),
-        errors=derived["errors"],
-        benchmark=np.stack(list(derived["goals"].values())[1:], axis=1),
-        demonstrations=demonstrations,
-        regions=_if_any(derived["regions"]),
-        predictions=_if_any(derived["predictions"]),
-        refreshes=_if_any(derived["refreshes"]),
-        requests=requests,
-    )
+    with record.translated_errors():
+        end, expected = about["ended_early"] or (settings["movements"], None)
+        finished = n == end and (settings["evaluate_at"] == [] or n in evaluated or is_empty)
+        return Run(
+            path=path,
+            config=settings,
+            versions=about["versions"],
+            files=about["files"],
+            robot=about["robot"],
+            words=about["words"],
+            folder=about.get("folder", ""),
+            tolerance=about.get("tolerance", float("nan")),
+            spaces={name: Box(*box) for name, box in about["spaces"].items()},
+            summary={
+                "movements": n,
+                "failed": int(arrays["failed"].sum()),
+                "finished": bool(finished),
+                "expected": expected,
+                **about.get("seconds", {}),
+            },
+            **arrays,
+            evaluations=_by_inverse(derived["evaluations"]),
+            errors=derived["errors"],
+            benchmark=np.stack(list(derived["goals"].values())[1:], axis=1),
+            demonstrations=demonstrations,
+            regions=_if_any(derived["regions"]),
+            predictions=_if_any(derived["predictions"]),
+            refreshes=_if_any(derived["refreshes"]),
+            requests=requests,
+        )
 
 
 def _if_any(columns: Columns) -> Columns | None:
@@ -236,13 +240,15 @@ def config_of(run: Run, *, trust: bool = False) -> Config:
     Raises:
         RunError: the settings name code of the user and ``trust`` is false, or are those of another version.
     """
-    code = [] if trust else code_of(run.config)
-    if code:
+    code = code_of(run.config)
+    if code and not trust:
         raise RunError(
             f"{run.path} names code outside this library, {', '.join(code)}; read it, then execute it with --trust"
         )
     try:
-        return Config.from_settings(run.config)
+        if code and run.folder not in sys.path:
+            sys.path.append(run.folder)
+        return Config.from_settings(run.config, Path(run.folder))
     except (TypeError, ValueError) as error:
         raise RunError(f"the settings of {run.path} do not describe a run of this version: {error}") from error
 
@@ -270,11 +276,12 @@ def finished(config: Config) -> bool:
     """Whether an undamaged run with these settings is on disk, complete with its last evaluation."""
     try:
         run, wanted = read_run(config.directory), with_found_earlier(config).settings
-        settings = run.config
-        names = (settings.keys() | wanted.keys()) - {*NOT_COMPARED}
-        others = any(differ(settings.get(name), wanted.get(name)) for name in names)
+        others = {*differing(run.config, wanted, run.folder)} - {*NOT_COMPARED}
         return bool(run.summary["finished"] and not others) and all(
-            config[name] is None or run.files.get(f"{name}_crc32") in (None, checksum(config[name])) for name in FILES
+            config[name] is None
+            or (name == "begin_with" and not config[name].exists())  # the record has its content
+            or run.files.get(f"{name}_crc32") in (None, checksum(config[name]))
+            for name in FILES
         )
     except (ValueError, OSError):  # another version, or unreadable; --resume will give the reason
         return False

@@ -9,7 +9,7 @@ import math
 import time
 import traceback
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -20,11 +20,10 @@ from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.learner.events import Event, Kind
 from sgimd_torch.options.build import RunParts
 from sgimd_torch.record import ReplayError, Row, RunError
-from sgimd_torch.runs.at_once import executing
 from sgimd_torch.runs.directory import open_run
 from sgimd_torch.runs.evaluations import Evaluations, ends_now
 from sgimd_torch.runs.signals import Failed, Progress, Stopped, Stopping, say
-from sgimd_torch.session import NoOutcomeError, run
+from sgimd_torch.session import Execute, NoOutcomeError, live, run
 from sgimd_torch.spaces import Episode
 
 N_TOLD: Final = 3  # number of failures with a message each; later ones are only counted
@@ -100,7 +99,7 @@ class RunLoop:
             board = BoardListener(parts.config.directory, parts, self.seconds.summary, self._curves)
             self.listeners.append(board)
         self._wanted = parts.config.evaluations  # numbers of movements before the evaluations to come
-        self._committed_at = time.monotonic()
+        self._committed_at, self._kept, self._told = time.monotonic(), self.recorded, False  # at the last commit
 
     def __enter__(self) -> Self:
         return self
@@ -159,8 +158,13 @@ class RunLoop:
     def episodes(self) -> Iterator[Episode]:
         """All episodes, one by one: first the recorded ones, then new ones."""
         parts, config = self.parts, self.parts.config
-        robot = parts.environment, config.constructor("environment")
-        with executing(*robot, config.seed, config.at_once) as execute:
+        executing: AbstractContextManager[Execute] = nullcontext(live(parts.environment, config.seed))
+        if config.at_once > 1:
+            from sgimd_torch.runs import at_once  # most runs have one robot
+
+            robot = parts.environment, config.constructor("environment")
+            executing = at_once.executing(*robot, config.seed, config.at_once)
+        with executing as execute:
             episodes = run(
                 parts.learner,
                 parts.environment,
@@ -187,19 +191,24 @@ class RunLoop:
         """Whether the episodes of all robots that moved at once were told to the listeners."""
         return self.movements == self.parts.learner.movements
 
-    def commit(self) -> None:
-        """Write everything to the disk, unless another program is reading the record: then later."""
+    def commit(self) -> bool:
+        """Write everything to the disk. If another program's reading prevents that, say so; the result is false."""
         self._committed_at = time.monotonic()
-        if self._try_commit():
+        self.record.about["seconds"] = self.seconds.summary()
+        if self.record.commit():
+            self._kept, self._told = self.movements, False
             for listener in self.listeners:
                 listener.flush()
+            return True
+        if not self._told:
+            say(f"another program reads {self.record.path}: until it ends, nothing after movement {self._kept} is kept")
+        self._told = True
+        return False
 
     def _keep(self) -> None:
         """Write the last movements to the disk, as soon as no other program reads the record."""
-        if not self.replaying and not self._try_commit():
-            say(f"waiting until no other program reads {self.record.path}, to write the last movements")
-            while not self._try_commit():
-                time.sleep(COMMIT_EVERY)
+        while not self.replaying and not self.commit():
+            time.sleep(COMMIT_EVERY)
 
     def _stop_if(self, stopping: Stopping) -> None:
         """Stop between two movements of the run or of an evaluation, if a signal was heard."""
@@ -214,10 +223,6 @@ class RunLoop:
     def _curves(self) -> dict[str, float]:
         """Numbers of the listeners for the board since the last call, by tag."""
         return {tag: value for listener in self.listeners for tag, value in listener.curves().items()}
-
-    def _try_commit(self) -> bool:
-        self.record.about["seconds"] = self.seconds.summary()
-        return self.record.commit()
 
     def _after(self, episode: Episode) -> None:
         replayed = self.replaying

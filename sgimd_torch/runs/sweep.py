@@ -36,6 +36,7 @@ from sgimd_torch.runs.read import finished, movements_on_disk
 from sgimd_torch.runs.signals import loading, parser_of, say
 
 Item = TypeVar("Item")
+MOST_SEEDS: Final = 100_000
 NOT_VARIED: Final = {
     "seed": "use --seeds, such as 5, 0-19 or 0,3,7-9",
     "name": "a sweep names each variant after its varied values",
@@ -81,11 +82,9 @@ def run_all(whole: Sequence[Config], options: argparse.Namespace, out: Path) -> 
     if options.dry_run or not left:
         return 0
     with loading():
-        from sgimd_torch.runs.directory import RUN_FILE, build_again, holds_run  # imported here so that --help is fast
+        from sgimd_torch.runs.directory import build_again, record_of  # imported here so that --help is fast
     for config in {config.directory.parent: config for config in left}.values():
-        build_again(
-            config, recorded=holds_run(config.directory / RUN_FILE)
-        )  # wrong options raise an error before any run starts
+        build_again(config, record_of(config))  # wrong options raise an error before any run starts
     make_folder(out)
     failures = sweep(left, options.processes)
     say(f"{len(left) - len(failures)} runs ended well, {len(failures)} failed: {out}", *failures)
@@ -196,15 +195,20 @@ def _in_name(option: str, value: str) -> str:
     return value if option == "algorithm" else f"{option}={Path(value).name if os.sep in value else value}"
 
 
+def is_count(text: str) -> bool:
+    """Whether a text is a whole number; Python reads the digits of all scripts."""
+    return text.isascii() and text.isdecimal()
+
+
 def _shard(text: str) -> Shard:
     k, slash, n = text.partition("/")
-    if not (slash and k.isdecimal() and n.isdecimal() and 1 <= int(k) <= int(n)):
+    if not (slash and is_count(k) and is_count(n) and 1 <= int(k) <= int(n)):
         raise argparse.ArgumentTypeError(f"must be like 1/4, the first of four parts, got {text!r}")
     return Shard(int(k), int(n))
 
 
 def _count(text: str) -> int:
-    if not text.isdecimal() or int(text) < 1:
+    if not is_count(text) or int(text) < 1:
         raise argparse.ArgumentTypeError(f"must be a whole number of at least 1, got {text!r}")
     return int(text)
 
@@ -213,7 +217,10 @@ def _seeds(text: str) -> list[int]:
     seeds: dict[int, None] = {}
     for part in text.split(","):
         first, dash, last = part.partition("-")
-        if not first.isdecimal() or (dash and not last.isdecimal()) or int(last or first) < int(first):
+        if not is_count(first) or (dash and not is_count(last)) or int(last or first) < int(first):
             raise argparse.ArgumentTypeError(f"must be like 5, 0-19 or 0,3,7-9, got {text!r}")
-        seeds |= dict.fromkeys(range(int(first), int(last or first) + 1))
+        numbers = range(int(first), int(last or first) + 1)
+        if len(numbers) > MOST_SEEDS:
+            raise argparse.ArgumentTypeError(f"are at most {MOST_SEEDS}, got {text}")
+        seeds |= dict.fromkeys(numbers)
     return list(seeds)

@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from sgimd_torch.options.config import Config
-from sgimd_torch.runs.directory import RUN_FILE, build_again, holds_run
+from sgimd_torch.runs.directory import build_again, record_of
 from sgimd_torch.runs.run import RunLoop
 from sgimd_torch.spaces import Array, Demonstration, stream
 from sgimd_torch.teach.by_hand import BY_HAND, ByHand
@@ -68,14 +68,14 @@ class TaughtRun:
     """
 
     def __init__(self, config: Config) -> None:
-        on_disk = holds_run(config.directory / RUN_FILE)
-        parts = build_again(config, recorded=on_disk)
+        record = record_of(config)
+        parts = build_again(config, record)
         self.config, self.led = parts.config, hand_led_of(parts.task)
         if parts.learner.social is None or parts.teachers:
             raise ValueError(ALONE.format(config.algorithm))
         self._hand = ByHand(teacher=parts.teacher)
         self.parts = replace(parts, teacher=self._hand)
-        self._loop = RunLoop(self.parts, resume=on_disk)
+        self._loop = RunLoop(self.parts, resume=record is not None)
         self._episodes = self._loop.episodes()
         self._lessons = sum(event.kind == "shown" and event.who == BY_HAND for event in self._loop.record.events())
         self._outcomes: deque[Array] = deque(maxlen=LATEST)

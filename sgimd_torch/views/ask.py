@@ -27,6 +27,7 @@ from sgimd_torch.files import check_writable, write_text
 from sgimd_torch.options.build import RunParts
 from sgimd_torch.options.signature import parsed
 from sgimd_torch.runs.load import OpenRun
+from sgimd_torch.runs.past import read_csv
 from sgimd_torch.runs.signals import parser_of
 from sgimd_torch.spaces import Array, Box, stream
 
@@ -45,12 +46,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     run = OpenRun(options.run, trust=options.trust)
     for path in filter(None, (options.out, options.trajectory)):
         check_writable(path)
-    run.replay()
     parts = run.parts
-    box = parts.environment.outcomes
-    goals = [*options.goal, *(_read(options.goals, box) if options.goals else [])]
+    goals = [*options.goal, *(_read(options.goals, parts.environment.outcomes) if options.goals else [])]
     if not goals or (options.trajectory and len(goals) > 1):
         raise ValueError("give --goal X,Y or --goals FILE; --trajectory takes one goal")
+    run.replay()
     answers = list(_answers(parts, goals, options.context, execute=options.execute))
     if options.trajectory:
         _write_trajectory(options.trajectory, parts, answers[0]["theta"])
@@ -110,16 +110,14 @@ def _answers(
 
 def _read(path: Path, box: Box) -> list[list[float]]:
     """The goals in a file; a first line of names is a header."""
-    rows = [row for row in csv.reader(path.read_text(encoding="utf-8").splitlines()) if row]
     goals = list[list[float]]()
-    for number, row in enumerate(rows):
+    for number, row in read_csv(path):
         try:
             goals.append([parsed(cell, float) for cell in row])
         except ValueError as error:
-            if number or not all(cell.strip()[:1].isalpha() for cell in row):
-                raise ValueError(
-                    f"{path}: row {number + 1} is no goal of {box.dim} numbers: {','.join(row)}"
-                ) from error
+            if number > 1 or not all(cell.strip()[:1].isalpha() for cell in row):
+                what = ",".join(row)[:60]
+                raise ValueError(f"{path}: line {number} is no goal of {box.dim} numbers: {what}") from error
     return goals
 
 

@@ -40,7 +40,7 @@ from sgimd_torch.demonstrations.fit import beyond_limits, misfit_of
 from sgimd_torch.demonstrations.text import read_text
 from sgimd_torch.demonstrations.units import in_units, paced
 from sgimd_torch.environments.protocol import Replaying, SimulationError, primitive_of
-from sgimd_torch.files import check_regular
+from sgimd_torch.files import check_regular, check_writable
 from sgimd_torch.options.build import task_of
 from sgimd_torch.options.command_line import parse
 from sgimd_torch.runs.signals import parsed_argument, parser_of, say
@@ -137,8 +137,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     options, of_robot = parser().parse_known_args(argv)
     importing = options.command == "import"
-    if options.command != "check" and options.out.suffix != ".npz":
-        raise ValueError(f"--out must end in .npz, got {options.out}")
+    if options.command != "check":
+        if options.out.suffix != ".npz":
+            raise ValueError(f"--out must end in .npz, got {options.out}")
+        check_writable(options.out)
     if options.command != "record":
         check_regular(options.source)
     task = None

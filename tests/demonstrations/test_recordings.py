@@ -137,6 +137,7 @@ REFUSED = {
     "UTF-16": (ONE.replace("", "\0"), NAMED, "it has a NUL, .* was it saved as UTF-16"),
     "degrees": (degrees(ONE), NAMED, "a reads up to 28.65 in one.txt, more than a turn in rad; .* --unit a=deg"),
     "degrees of one joint": (degrees(ONE), f"{NAMED} --unit a=deg", "b reads up to 34.38 .* --unit b=deg"),
+    "digits of another script": (degrees(ONE).replace("0", "\u0660"), NAMED, "is .*, no number"),
     "an unknown unit": (ONE, f"{NAMED} --unit a=turns", "the unit of a must be rad, deg or a range .*, got turns"),
     "a range of nothing": (ONE, f"{NAMED} --unit a=5:5.0", "the unit of a must be rad, deg or a range .*, got 5:5.0"),
     "a range without a robot": (ONE, f"{NAMED} --unit a=0:100", "a=0:100 maps onto the range of a joint of a robot"),

@@ -1,7 +1,10 @@
 """The environment protocol, and the planar arm whose reachable set and inverse are known exactly."""
 
+import os
 import pickle
+import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 import pytest
@@ -217,3 +220,36 @@ CHAIN, TAU = np.zeros((5, 3, 2)), np.zeros(2)
 def test_what_makes_no_sense_is_refused(call: Callable[[], object], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         call()
+
+
+class Forking(PlanarArm):
+    """A robot that forks a process, which ends in some way; it tells with which exit code."""
+
+    def __init__(self, end, code):
+        super().__init__(2)
+        self.end, self.code, self.owner = end, code, os.getpid()
+
+    def execute(self, context, theta, rng):
+        child = os.fork()
+        if not child:
+            self.end()
+            return np.zeros(2)
+        assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == self.code
+        return super().execute(context, theta, rng)
+
+    def execute_many(self, contexts, thetas, rngs):
+        return np.stack([self.execute(*movement) for movement in zip(contexts, thetas, rngs, strict=True)])
+
+
+@pytest.mark.filterwarnings("ignore:This process .* is multi-threaded:DeprecationWarning")
+@pytest.mark.parametrize("n", [1, 2])
+@pytest.mark.parametrize(
+    ("end", "code"),
+    [(partial(sys.exit, 3), 3), (sys.exit, 0), (partial(sys.exit, "ill"), 1), (dict, 0), (lambda: 1 / 0, 1)],
+)
+def test_a_process_that_a_robot_forks_never_goes_on_with_the_run(end, code, n):
+    robot, owner = Forking(end, code), os.getpid()
+    outcomes = execute_many(robot, np.zeros((n, 0)), np.full((n, 2), 0.5), [stream(0, "x", k) for k in range(n)])
+    if os.getpid() != owner:
+        os._exit(99)
+    assert [outcome.shape for outcome in outcomes] == [(2,)] * n

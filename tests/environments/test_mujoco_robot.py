@@ -1,5 +1,6 @@
 """A robot from its model file: its outcome is where the model says, whatever the file; slips are told in a line."""
 
+import os
 import re
 import sys
 from functools import partial
@@ -62,6 +63,7 @@ URDF = (
     + JOINT.format("flange", "fixed", "fore", "tool", 0.2)
     + "</robot>"
 )
+STEPS = [("still", 0), ("fine", 1e-9)]
 LIMITS = np.deg2rad([120, 90])
 CORNERS = {"low": (-1.0, -1.0), "high": (1.0, 1.0)}
 NONE = np.zeros(0)
@@ -70,7 +72,11 @@ NONE = np.zeros(0)
 @pytest.fixture(scope="module")
 def files(tmp_path_factory):
     folder = tmp_path_factory.mktemp("models")
-    for name, text in (("arm.xml", ARM), ("arm.urdf", URDF), ("tooth.obj", TOOTH)):
+    absurd = {
+        f"{name}.xml": ARM.replace("<worldbody>", f'<option timestep="{step}"/><worldbody>') for name, step in STEPS
+    }
+    absurd["slow.urdf"] = re.sub('velocity="[^"]*"', 'velocity="1e-6"', URDF)
+    for name, text in {"arm.xml": ARM, "arm.urdf": URDF, "tooth.obj": TOOTH, **absurd}.items():
         (folder / name).write_text(text)
     return folder
 
@@ -272,7 +278,21 @@ def test_a_robot_made_by_a_function_of_the_user_has_no_options_to_keep(here):
         ({"model": ""}, "model is missing: the path of an MJCF or URDF file"),
         ({"model": "tooth.obj"}, "tooth.obj cannot be used: "),
         ({"settle": -1.0}, "settle must be finite and >= 0"),
-        ({"n_knots": 1}, "n_knots must be a whole number >= 2"),
+        ({"context": "joint:hinge:1_0:20"}, "1_0 and 20 must be two numbers, the lower one first"),
+        ({"context": "joint:hinge:0:\u0661"}, "0 and \u0661 must be two numbers, the lower one first"),
+        ({"joints": ("elbow", "elbow")}, "joints names 'elbow' 2 times"),
+        ({"n_knots": 1}, "n_knots must be a whole number from 2 to 100, got 1"),
+        ({"n_knots": 10**9}, "n_knots must be a whole number from 2 to 100, got 1000000000"),
+        ({"threads": 10**5}, "threads must be a whole number from 1 to 1024, got 100000"),
+        ({"durations": (500.0, 1500.0)}, "1500 s and settle 0.5 s take 3e+05 steps at the model's timestep 0.005,"),
+        ({"durations": (0.5, np.inf)}, "a movement of inf s and settle 0.5 s take inf steps"),
+        ({"settle": 1e9}, "a movement of 1.5 s and settle 1e+09 s take 2e+11 steps"),
+        ({"model": "still.xml"}, "take inf steps at the model's timestep 0, more than 100000"),
+        ({"model": "fine.xml"}, "take 2e+09 steps at the model's timestep 1e-09, more than 100000; durations, settle"),
+        (
+            {"model": "slow.urdf", "outcome": "body:tool:xz"},
+            "more than 100000; durations, settle and timestep are in s",
+        ),
         ({"low": (0.0, 0.0, 0.0), "high": (1.0, 1.0)}, "low must have shape (..., 2)"),
     ],
 )
@@ -280,6 +300,27 @@ def test_a_slip_is_told_in_one_line(here, options, said):
     with pytest.raises(ValueError, match=re.escape(said)) as raised:
         MujocoRobot(**{"model": "arm.xml", "outcome": "site:tip:xy", **options})
     assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("model", "element"),
+    [
+        ("arm.xml", '<include file="{}"/>'),
+        ("arm.xml", '<include file="deeper.xml"/>'),
+        ("arm.xml", '<compiler assetdir="parts"/><asset><mesh name="m" file="../{}"/></asset>'),
+        ("arm.xml", '<asset><texture type="cube" fileright="{}"/></asset>'),
+        ("arm.urdf", '<link name="more"><visual><geometry><mesh filename="{}"/></geometry></visual></link>'),
+    ],
+)
+def test_a_pipe_in_a_model_is_refused_and_keeps_nobody_waiting(here, tmp_path, monkeypatch, model, element):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "parts").mkdir()
+    os.mkfifo(tmp_path / "pipe.stl")
+    (tmp_path / "deeper.xml").write_text('<mujocoinclude><include file="pipe.stl"/></mujocoinclude>')
+    text, last = (here / model).read_text(), "</mujoco>" if model == "arm.xml" else "</robot>"
+    (tmp_path / model).write_text(text.replace(last, element.format("pipe.stl") + last))
+    with pytest.raises(OSError, match=r"pipe\.stl is a pipe or a device, not a file"):
+        MujocoRobot(model, outcome="site:tip:xy")
 
 
 def test_without_the_package_the_menagerie_is_refused_with_what_to_install(here, monkeypatch):

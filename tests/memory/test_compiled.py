@@ -77,13 +77,22 @@ print(kernels.locally_linear(alike, outcomes, outcomes, np.array([1.0]), box)[0]
 """
 
 
+MISSING = """
+from sgimd_torch.memory.compiled import compiled
+compiled("sgimd_torch.nothing")
+"""
+
+
 def test_a_damaged_cache_is_made_again_and_a_change_of_what_compiled_code_calls_takes_effect(package, tmp_path):
     mine = {"NUMBA_CACHE_DIR": str(tmp_path / "mine")}
     assert started(package, NEAREST, **mine).communicate() == ("1\n", SAID)
-    for path in [*(tmp_path / "mine").rglob("*.nb?")]:
-        path.write_bytes(path.read_bytes()[:20])
+    (path,) = (tmp_path / "mine").rglob("*.nbc")
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1  # of the machine code: numba would not notice it
+    path.write_bytes(content)
     assert started(package, NEAREST, **mine).communicate() == ("1\n", SAID)
-    assert started(package, NEAREST, **mine).communicate() == ("1\n", "")
+    assert "No module named 'sgimd_torch.nothing'" in started(package, MISSING, **mine).communicate()[1]
+    assert started(package, NEAREST, **mine).communicate() == ("1\n", "")  # an error of another kind removes nothing
     called = package / "memory" / "jit.py"
     called.write_text(called.read_text().replace("total += (one[k] - other[k]) ** 2", "total -= one[k]"))
     assert started(package, NEAREST, **mine).communicate() == ("0\n", SAID)

@@ -72,6 +72,23 @@ def test_events_are_made_by_the_learner_alone_and_read_by_the_record():
     assert makers == {"learner/__init__.py", "learner/slots.py", "record/layout.py"}  # the last reads events from rows
 
 
+def test_every_output_is_written_by_the_functions_of_one_file():
+    writers = {
+        (path.relative_to(PACKAGE).as_posix(), name_of(call.func))
+        for path in PACKAGE.rglob("*.py")
+        for call in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(call, ast.Call) and isinstance(call.func, ast.Attribute | ast.Name)
+        if (isinstance(call.func, ast.Attribute) and call.func.attr in {"write_text", "write_bytes"})
+        or (name_of(call.func) == "open" and {*"wax"} & {*"".join(a.value for a in call.args if is_mode(a))})
+    }
+    writers -= {("runs/parallel.py", "open"), ("memory/compiled.py", "write_text")}  # a log that grows, and a cache
+    assert writers == {("files.py", "write_bytes")}
+
+
+def is_mode(argument: ast.expr) -> bool:
+    return isinstance(argument, ast.Constant) and isinstance(argument.value, str) and len(argument.value) < 4
+
+
 LEARN = """
 from sgimd_torch import PlanarArm, practice, run
 arm = PlanarArm(7)

@@ -21,7 +21,7 @@ from sgimd_torch.spaces import Failure, stream
 from worlds import NO_CONTEXT
 
 MODULE = """
-import os, time
+import os, threading, time
 import numpy as np
 from sgimd_torch.environments.planar_arm import PlanarArm
 class Slow(PlanarArm):
@@ -41,6 +41,20 @@ class Mortal(PlanarArm):
         os._exit(3)
 class Single(PlanarArm):
     at_once = 1
+class Exclusive(PlanarArm):
+    execute_many = None
+    def __init__(self):
+        super().__init__(3)
+        import multiprocessing
+        if multiprocessing.parent_process() is not None:
+            raise ConnectionError("its port is taken")
+class Hanging(PlanarArm):
+    execute_many = None
+    def execute(self, context, theta, rng):
+        if rng.random() < 0.2:
+            open("hangs", "w").close()
+            threading.Event().wait()
+        return super().execute(context, theta, rng)
 """
 
 
@@ -106,12 +120,31 @@ def test_an_evaluation_comes_after_the_group_in_which_it_falls(go, tmp_path):
     ("robot", "code", "said"),
     [
         ("Single", 2, "at_once must be at most 1, the at_once of Single, got 4"),
-        ("Mortal", 1, "a process that executes movements has ended"),
+        ("Mortal", 1, "a process that executes movements ended with exit code 3; is one robot all there is?"),
+        ("Exclusive", 1, "cannot make its robot: ConnectionError: its port is taken; is one robot all there is?"),
     ],
 )
 def test_robots_that_cannot_move_at_once_are_told(go, own, tmp_path, capfd, robot, code, said):
     assert go(tmp_path, *RUN, f"robots_at_once:{robot}", *UNJUDGED, "--movements", "200") == code
-    assert said in capfd.readouterr().err
+    printed = capfd.readouterr().err
+    assert said in printed
+    assert "Traceback" not in printed
+
+
+def test_the_second_ctrl_c_ends_a_run_of_processes_that_hang(own, tmp_path):
+    """Whoever waits for them waits for ever."""
+    options = [*RUN, "robots_at_once:Hanging", "--evaluate-at", "[]", "--movements", "500", "--out", str(tmp_path)]
+    with subprocess.Popen([sys.executable, "-m", "sgimd_torch", "run", *options], stderr=subprocess.PIPE) as run:
+        while not (tmp_path / "hangs").exists():
+            assert run.poll() is None
+            time.sleep(0.05)
+        children = children_of(run.pid, 1)
+        run.send_signal(signal.SIGINT)
+        assert any(b"Ctrl-C once more" in line for line in run.stderr)
+        run.send_signal(signal.SIGINT)
+        assert run.wait() == 130
+    while any(Path(f"/proc/{each}").exists() for each in children):
+        time.sleep(0.05)
 
 
 def test_the_processes_end_with_a_run_that_is_killed(own, tmp_path):
@@ -125,8 +158,8 @@ def test_the_processes_end_with_a_run_that_is_killed(own, tmp_path):
         time.sleep(0.05)
 
 
-def children_of(pid):
-    """Processes that were begun by another one; at least four, as its robots move at once."""
+def children_of(pid, least=4):
+    """Processes that were begun by another one, at least so many."""
     found = Path(f"/proc/{pid}/task/{pid}/children")
     listed = found.read_text().split() if found.exists() else []
-    return listed if len(listed) >= 4 else []
+    return listed if len(listed) >= least else []

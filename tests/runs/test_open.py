@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from boards import curves_of
+from runs import LIVE, start
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.sketch import traced
 from sgimd_torch.evaluation import Benchmark, save_benchmark
@@ -176,6 +177,37 @@ def test_the_loaded_learner_is_the_one_that_lived(run):
     learner = load_learner(run.path, trust=True)
     np.testing.assert_array_equal(answers_of(replace(run.parts, learner=learner)), run.answers)
     assert learner.movements == run.parts.learner.movements
+
+
+def test_a_run_of_relative_paths_and_own_code_is_opened_from_another_folder(tmp_path, monkeypatch, capsys):
+    for name in ("one", "other"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "one/placed.py").write_text(
+        "from pathlib import Path\nfrom sgimd_torch.environments.mujoco_robot import MujocoRobot\n"
+        "def make(*, file: Path = Path(), **more):\n    return MujocoRobot(file, outcome='site:tip:xy')\n"
+    )
+    (tmp_path / "one/arm.xml").write_text(MODEL)
+    save_benchmark(tmp_path / "one/model.npz", Benchmark("MujocoRobot", GOALS + 0.1, 0.1))
+    of_file = "--environment mujoco --environment.model {}arm.xml --environment.outcome site:tip:xy"
+    common = "--algorithm random --movements 20 --repeats 0 --out {} --benchmark {}model.npz"
+    monkeypatch.chdir(tmp_path / "one")
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    assert command(main, f"{of_file.format('')} {common.format('runs', '')}".split()) == 0
+    own = f"--environment placed:make --environment.file arm.xml --name own {common.format('runs', '')}"
+    own_process = start(LIVE, *own.split())  # so that this process does not know the module
+    own_process.communicate()
+    assert own_process.returncode == 0
+    monkeypatch.chdir(tmp_path / "other")
+    for name in ("random", "own"):
+        words = [f"../one/runs/{name}/seed-000", "--goal=0.3,0.3", "--trust"]
+        assert command(ask.main, words) == 0, capsys.readouterr().err
+    again = f"{of_file.format('../one/')} {common.format('../one/runs', '../one/')} --resume"
+    assert command(main, [*again.split(), "--movements", "25"]) == 0
+    assert read_run(tmp_path / "one/runs/random/seed-000").summary["movements"] == 25
+    (tmp_path / "other/arm.xml").write_text(MODEL)
+    again = f"{of_file.format('')} {common.format('../one/runs', '../one/')} --resume"
+    assert command(main, again.split()) == 2  # another file, though of the same name
+    assert "environment.model was ../one/arm.xml, now arm.xml" in capsys.readouterr().err
 
 
 def test_ask_gives_the_movements_of_the_learner_that_lived(run, tmp_path):

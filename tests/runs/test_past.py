@@ -8,11 +8,12 @@ import pytest
 from runs import content_of, edit, write_about
 from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.options.command_line import main
+from sgimd_torch.options.command_line import main, parse
+from sgimd_torch.record import RunError
 from sgimd_torch.record.saving import save_life
 from sgimd_torch.runs.directory import RUN_FILE
 from sgimd_torch.runs.load import load_learner
-from sgimd_torch.runs.read import read_run
+from sgimd_torch.runs.read import finished, read_run
 from sgimd_torch.runs.signals import command
 
 SHORT = ["--environment", "planar-arm-7", "--repeats", "0", "--evaluate-at", "[]"]
@@ -56,6 +57,20 @@ def test_a_run_begins_with_a_run_or_an_equal_table_and_is_resumed_with_it(past, 
     assert "begin_with_crc32 was" in capsys.readouterr().err
 
 
+def test_a_run_is_asked_and_resumed_when_the_file_it_began_with_is_gone(past, tmp_path, monkeypatch):
+    listed = table(tmp_path / "past.csv", past)
+    for name in ("whole", "cut"):
+        assert go(tmp_path / name, "--movements", 40 if name == "whole" else 20, "--begin-with", listed) == 0
+    listed.unlink()
+    monkeypatch.chdir(tmp_path / "cut")
+    assert load_learner("practice/seed-000").movements == 20
+    assert go(".", "--movements", 40, "--begin-with", "../past.csv", "--resume") == 0
+    assert content_of(tmp_path / "cut/practice/seed-000") == content_of(tmp_path / "whole/practice/seed-000")
+    assert len(content_of(tmp_path / "cut/practice/seed-000")["prior"]) == 120
+    config, _ = parse([*SHORT, "--out", ".", "--movements", "40", "--begin-with", "../past.csv"])
+    assert finished(config)
+
+
 def refused(path, said, out, capsys):
     """It is refused as a past in one line, and nothing is left."""
     capsys.readouterr()
@@ -69,19 +84,31 @@ def refused(path, said, out, capsys):
 EIGHT_JOINTS = ",".join([*(f"theta_{k}" for k in range(8)), "outcome_0", "outcome_1"])
 TABLES = [  # what is done to the lines of a right table, and what is said about it
     (lambda lines: [lines[0].replace("theta_6", "theta_x"), *lines[1:]], "lacks the column theta_6"),
+    (lambda lines: [f"theta_0,{lines[0]}", *(f"0.5,{line}" for line in lines[1:])], "has two columns theta_0"),
+    (lambda lines: [*lines[:3], lines[3].replace("0.", "\u0660.", 1)], "line 4 is no movement of 9 numbers"),
+    (lambda lines: [*lines[:3], "1" * 200_000], "is no csv file: field larger than field limit"),
     (lambda lines: [EIGHT_JOINTS], "has a column theta_7, so it is of another robot"),
     (lambda lines: [*lines[:3], lines[3].replace("0.", "x.", 1)], "line 4 is no movement of 9 numbers"),
     (lambda lines: [*lines[:3], lines[3].replace("0.", "0_0.", 1)], "line 4 is no movement of 9 numbers"),
     (lambda lines: [*lines, ",".join(["5"] * 9)], "must lie in its box"),
-    (lambda lines: ["\xff\xfe\0\1"], "is neither a record nor a csv file"),
+    (lambda lines: ["\udcff\udcfe\0\1"], "is no csv file: 'utf-8' codec"),
 ]
 
 
 @pytest.mark.parametrize(("change", "said"), TABLES)
 def test_a_table_that_does_not_fit_is_refused(change, said, past, tmp_path, capsys):
     path = table(tmp_path / "other.csv", past)
-    path.write_bytes("\n".join(change(path.read_text().splitlines())).encode("latin-1"))
+    path.write_bytes("\n".join(change(path.read_text().splitlines())).encode("utf-8", "surrogateescape"))
     refused(path, said, tmp_path / "out", capsys)
+
+
+@pytest.mark.parametrize("spaces", ["far", {"contexts": "far"}, {"contexts": [0]}, [], None])
+def test_a_record_whose_spaces_say_nothing_is_refused(spaces, past, tmp_path, capsys):
+    (tmp_path / RUN_FILE).write_bytes(past.read_bytes())
+    write_about(tmp_path, spaces=spaces)
+    refused(tmp_path / RUN_FILE, "cannot be read as a record", tmp_path / "out", capsys)
+    with pytest.raises(RunError, match="cannot be read as a record"):
+        read_run(tmp_path)
 
 
 @pytest.mark.parametrize(("unit", "farther", "said"), [("mm", 0, "are in mm, here in m"), ("m", 1, "policies of")])

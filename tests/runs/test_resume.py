@@ -1,5 +1,6 @@
 """Runs that are stopped, killed, damaged or made longer: in the end they are as if nothing had happened."""
 
+import os
 import re
 import shutil
 import signal
@@ -238,35 +239,52 @@ def test_a_full_disk_is_reported_and_the_run_can_go_on(tmp_path, go, benchmark, 
     assert content_of(directory) == reference
 
 
-def test_a_program_that_reads_the_record_all_the_time_stops_no_run(tmp_path, go, reference, monkeypatch, capsys):
+def viewed(path):
+    """A connection of another program that has begun to read a record and does not end."""
+    viewer = sqlite3.connect(path, isolation_level=None)
+    viewer.execute("BEGIN")
+    assert viewer.execute("SELECT * FROM events").fetchone()
+    return viewer
+
+
+def test_beside_an_open_cursor_of_another_program_a_killed_run_keeps_every_commit(tmp_path, go, benchmark, reference):
+    directory = tmp_path / "sgim-d" / "seed-003"
+    process = stopped_at("20 or life.movements == 60", *arguments(tmp_path, benchmark))
+    viewer = viewed(directory / RUN_FILE)
+    process.send_signal(signal.SIGCONT)
+    assert os.WIFSTOPPED(os.waitpid(process.pid, os.WUNTRACED)[1])
+    assert end(process)[0] == -signal.SIGKILL
+    shutil.copytree(directory, tmp_path / "copied" / "seed-003")
+    assert movements_on_disk(tmp_path / "copied" / "seed-003") == 60
+    viewer.close()
+    assert movements_on_disk(directory) == 60
+    assert go(tmp_path, "--resume") == 0
+    assert content_of(directory) == reference
+    before = files_of(directory)
+    assert [*before] == [RUN_FILE]  # a finished run is one file, which no reader changes
+    assert movements_on_disk(directory) == 90
+    assert files_of(directory) == before
+
+
+@pytest.mark.parametrize("local", [True, False])
+def test_where_a_reader_stops_commits_a_line_says_since_when(tmp_path, copy, monkeypatch, local, go, capsys):
+    """A reader that came before the log, or a file system of several machines."""
     monkeypatch.setattr(run_module, "COMMIT_EVERY", 0.0)
-    monkeypatch.setattr("sgimd_torch.record._PATIENCE", 0.0)
-    path, after, commit = (
-        tmp_path / "sgim-d" / "seed-003" / RUN_FILE,
-        run_module.RunLoop._after,
-        run_module.RunLoop._try_commit,
-    )
-    viewers, last = [], []
+    monkeypatch.setattr("sgimd_torch.record._shares_memory", lambda path: local)
+    viewer, commit, kept = viewed(copy / RUN_FILE), Record.commit, []
 
-    def look(life, episode):
-        after(life, episode)
-        if episode.index == 20:
-            viewers.append(sqlite3.connect(path, isolation_level=None))
-            viewers[0].execute("BEGIN")
-            viewers[0].execute("SELECT * FROM events").fetchall()
+    def commit_and_note(record):
+        kept.append(commit(record))
+        if len(kept) == 20:
+            viewer.close()
+        return kept[-1]
 
-    def committed(life):
-        done = commit(life)
-        last.append((life.movements, done))
-        if last[-6:] == [(90, False)] * 6:
-            viewers[0].close()
-        return done
-
-    monkeypatch.setattr(run_module.RunLoop, "_after", look)
-    monkeypatch.setattr(run_module.RunLoop, "_try_commit", committed)
-    assert go(tmp_path) == 0
-    assert "waiting until no other program reads" in capsys.readouterr().err
-    assert content_of(path.parent) == reference
+    monkeypatch.setattr(Record, "commit", commit_and_note)
+    assert go(tmp_path, "--resume", "--movements", "100") == 0
+    said = f"another program reads {copy / RUN_FILE}: until it ends, nothing after movement 90 is kept"
+    assert capsys.readouterr().err.count(said) == 1
+    assert kept[:20] == [False] * 20
+    assert movements_on_disk(copy) == 100
 
 
 def test_ctrl_c_during_an_evaluation_stops_after_its_movement_and_the_run_ends_as_if_it_never_was(

@@ -1,5 +1,6 @@
 """What the views refuse, all in one table: the reason is said, the exit code is 2, and nothing is written."""
 
+import os
 import shutil
 import sys
 from pathlib import Path
@@ -23,6 +24,9 @@ def place(tmp_path_factory):
     (folder / "sliders.py").write_text(MODULE)
     (folder / "bad.csv").write_text("0,1\n1,z\n")
     (folder / "first.csv").write_text("0.3,1_0\n")
+    (folder / "wide.csv").write_text(f"0,{'1' * 200_000}\n")
+    for name in ("pipe.csv", "pipe.npz", "pipe.mp4"):
+        os.mkfifo(folder / name)
     (folder / "empty").mkdir()
     sys.path.insert(0, str(folder))
     runs = {

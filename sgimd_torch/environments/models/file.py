@@ -6,6 +6,7 @@ robot = load_model(Path("arm.xml"), (), "auto", "", ()); robot.model, robot.star
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Final, NamedTuple
 from xml.etree import ElementTree
@@ -22,6 +23,7 @@ from sgimd_torch.options.catalogue import unknown_name_error
 from sgimd_torch.spaces import check_point
 
 SERVOS: Final = ("auto", "file", "made")
+_FOLDERS: Final = ("assetdir", "meshdir", "texturedir")  # attributes of a compiler
 _HOMES: Final = ("home", "rest")  # names of keyframes in which movements begin unless another one is chosen
 
 
@@ -67,6 +69,8 @@ def load_model(path: Path, joints: Sequence[str], servos: str, keyframe: str, po
         raise unknown_name_error("servos", servos, SERVOS)
     if path.suffix.lower() == ".sdf":
         raise ValueError(f"{path.name} is an SDF file; MuJoCo reads MJCF and URDF, so give the robot's URDF")
+    with suppress(ElementTree.ParseError):  # MuJoCo says where
+        _check_parts(path)
     remarks, accelerations = list[str](), dict[str, float]()
     try:
         spec = mujoco.MjSpec.from_file(str(path))
@@ -115,6 +119,24 @@ def load_model(path: Path, joints: Sequence[str], servos: str, keyframe: str, po
         )
     except ValueError as error:
         raise ValueError(f"{path.name} cannot be used: {_with_advice(' '.join(str(error).split()), path)}") from error
+
+
+def _check_parts(path: Path) -> None:
+    """Refuse a pipe or a device among the files that a model includes or refers to; MuJoCo would wait for them."""
+    elements, known = [*ElementTree.parse(path).iter()], {path}
+    for element in elements:  # grows
+        included = path.parent / element.get("file", "")
+        if element.tag == "include" and included not in known and included.exists() and not included.is_dir():
+            check_regular(included)
+            known.add(included)
+            elements += ElementTree.parse(included).iter()
+    compilers = [element.attrib for element in elements if element.tag == "compiler"]
+    folders = {path.parent / compiler.get(kind, "") for compiler in compilers for kind in _FOLDERS} | {path.parent}
+    for element in elements:
+        for file in (text for name, text in element.attrib.items() if name.startswith("file")):
+            for place in (folder / name for folder in folders for name in (file, Path(file).name)):
+                if place.exists():
+                    check_regular(place)
 
 
 def files_of(path: Path) -> list[Path]:

@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 
 from sgimd_torch.options.catalogue import did_you_mean
+from sgimd_torch.options.signature import parsed
 from sgimd_torch.spaces import Array, Box
 
 _COUNTS: Final = {"site": "nsite", "body": "nbody", "geom": "ngeom", "joint": "njnt"}
@@ -113,7 +114,7 @@ def context_box(model: mujoco.MjModel, context: str) -> tuple[Box, list[int]]:
                 raise ValueError(f"{what}: only a body with a free joint has an axis x, y or z; else write joint:NAME")
             address = int(model.jnt_qposadr[joint]) + _AXES.index(words[1])
         try:
-            sides.append([float(low), float(high)])
+            sides.append([parsed(low, float), parsed(high, float)])
             Box(*np.array(sides[-1:]).T)
         except ValueError:
             raise ValueError(f"{what}: {low} and {high} must be two numbers, the lower one first") from None
