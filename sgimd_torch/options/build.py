@@ -6,11 +6,12 @@ parts = build(Config(seed=3)); for episode in run(parts.learner, parts.environme
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 from sgimd_torch.changes import check_watcher
+from sgimd_torch.environments.previous import with_previous
 from sgimd_torch.environments.protocol import Environment, FromFiles
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.learner import Learner
@@ -123,7 +124,8 @@ def task_of(config: Config) -> Task:
         ValueError: the environment cannot be built, or is no environment.
     """
     task = call_checked(f"environment {config['environment']}", config.constructor("environment"))
-    return task if isinstance(task, Task) else Task(task)
+    task = task if isinstance(task, Task) else Task(task)
+    return replace(task, environment=with_previous(task.environment)) if config.context else task
 
 
 def _needs_demonstrations(make: Callable[..., Any]) -> bool:

@@ -15,10 +15,11 @@ from functools import partial
 from pathlib import Path
 from typing import Final, Protocol, Self, runtime_checkable
 
+from sgimd_torch.changes.carried_over import error_knowing_previous
 from sgimd_torch.environments.protocol import FAILURES, SimulationError, reason_of
 from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.learner.events import Event, Kind
-from sgimd_torch.options.build import RunParts
+from sgimd_torch.options.build import RunParts, task_of
 from sgimd_torch.record import ReplayError, Row, RunError
 from sgimd_torch.runs.at_once import executing
 from sgimd_torch.runs.directory import open_run
@@ -28,6 +29,7 @@ from sgimd_torch.session import NoOutcomeError, run
 from sgimd_torch.spaces import Episode
 
 N_TOLD: Final = 3  # number of failures with a message each; later ones are only counted
+LOOKED_BACK: Final = (50, 100, 200)  # numbers of movements at which to test whether the robot has a memory
 COMMIT_EVERY: Final = 1.0  # s between two commits; a killed run loses the movements since the last commit
 
 
@@ -101,6 +103,7 @@ class RunLoop:
             self.listeners.append(board)
         self._wanted = parts.config.evaluations  # numbers of movements before the evaluations to come
         self._committed_at = time.monotonic()
+        self._told = False  # whether it was said that the robot has a memory
 
     def __enter__(self) -> Self:
         return self
@@ -159,8 +162,7 @@ class RunLoop:
     def episodes(self) -> Iterator[Episode]:
         """All episodes, one by one: first the recorded ones, then new ones."""
         parts, config = self.parts, self.parts.config
-        robot = parts.environment, config.constructor("environment")
-        with executing(*robot, config.seed, config.at_once) as execute:
+        with executing(parts.environment, partial(task_of, config), config.seed, config.at_once) as execute:
             episodes = run(
                 parts.learner,
                 parts.environment,
@@ -234,16 +236,32 @@ class RunLoop:
             self._evaluate()
         if self.movements == self.recorded:
             self._begin()
+        if not replayed and self.movements in LOOKED_BACK:
+            self._look_back()
         if not self.replaying and time.monotonic() - self._committed_at >= COMMIT_EVERY:
             self.commit()
+
+    def _look_back(self) -> None:
+        """Say once if outcomes depend on the movement before."""
+        config, learner = self.parts.config, self.parts.learner
+        if self._told or config.context or config.at_once > 1 or not learner.inverse.says_how_sure:
+            return
+        with self.seconds.of("learner"):
+            share = error_knowing_previous(learner)
+        if share is not None:
+            self._told = True
+            say(
+                f"outcomes depend on the movement before, which would explain {1 - share:.0%} of the error of "
+                "predictions: give it as context (--context previous), or return to the same state before each movement"
+            )
 
     def _ends_early(self) -> bool:
         """Whether --until ends the run now; then there is a last evaluation."""
         config = self.parts.config
         if config.until is None or self.replaying or not self._all_told or self.movements >= config.movements:
             return False
-        with self.seconds.of("learner"):
-            ends = ends_now(self.parts, self.record, self.movements)
+        with self.seconds.of("evaluation"):
+            ends = ends_now(self.parts, self.record, self.movements, self.evaluations.between)
         if ends and config.evaluations:
             self.evaluations.parts = replace(self.parts, config=replace(config, movements=self.movements))
             self._evaluate()
