@@ -20,6 +20,7 @@ from sgimd_torch.options.build import RunParts
 from sgimd_torch.options.config import OWN
 from sgimd_torch.parts import Inverse
 from sgimd_torch.record import Record
+from sgimd_torch.runs.signals import say
 from sgimd_torch.spaces import Array, stream
 
 if TYPE_CHECKING:
@@ -146,6 +147,9 @@ def ends_now(parts: RunParts, record: Record, movements: int, between: Callable[
     tried = rng.permutation(goals)[:TRIED]
     evaluation = evaluate(learner.inverse, parts.environment, tried, config.seed, movements, repeats=0, between=between)
     if evaluation.mean_error > config.until:
+        amount = parts.environment.outcomes.amount
+        missed = f"{len(tried)} answers missed by {amount(evaluation.mean_error, '.4f')}"
+        say(f"after {movements} movements {amount(expected, '.4f')} was expected, but {missed}: the run goes on")
         return False
     record.about["ended_early"] = [movements, max(expected, evaluation.mean_error)]
     return True
