@@ -6,7 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
+from finger import Finger
 from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import (
@@ -99,6 +101,39 @@ def test_a_perfect_inverse_makes_no_error_in_any_context_given_for_all_goals_or_
         found = evaluate(Perfect(arm), arm, goals, 0, 0, context=context, repeats=0)
         assert found.errors == pytest.approx(np.zeros(4), abs=1e-9)
         assert context is None or np.array_equal(found.contexts, np.broadcast_to(context, (4, 1)))
+
+
+class Remembering(PlanarArm):
+    """Its turn is the state in which the last movement has left it."""
+
+    execute_many = None
+
+    def __init__(self) -> None:
+        super().__init__(5, context=True)
+        self.turn = 0.0
+
+    def observe(self, rng: np.random.Generator) -> Array:
+        return np.array([self.turn])
+
+    def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
+        outcome = super().execute([self.turn], theta, rng)
+        self.turn = float(outcome[0]) / 2
+        return outcome
+
+
+def test_a_context_that_is_the_state_of_the_robot_is_seen_before_each_movement() -> None:
+    arm, goals = Remembering(), stream(0, "goals").uniform(-0.6, 0.6, (8, 2))
+    found = evaluate(Perfect(arm), arm, goals, 0, 0, repeats=2)
+    assert found.errors == pytest.approx(np.zeros(8), abs=1e-9)
+    assert found.noise_floor == pytest.approx(0, abs=1e-9)  # repeats are answered in the state that they find, too
+    assert len(np.unique(found.contexts)) == 8
+
+
+def test_movements_are_repeated_in_another_order_so_that_a_robot_with_memory_scatters() -> None:
+    finger, goals = Finger(), np.array([[100.0, 40.0], [100.0, -40.0], [130.0, 0.0], [80.0, 0.0]] * 5)
+    memory = executed(finger, stream(0, "thetas").random((200, 3)))
+    found = evaluate(NearestNeighbour(problem(memory=memory)), finger, goals, 0, 0)
+    assert found.noise_floor > 5  # mm; in the same order it would be .6, the noise alone
 
 
 def test_ctrl_c_is_heard_between_blocks_of_movements_also_if_the_robot_executes_many_together() -> None:

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from sgimd_torch.environments.protocol import Environment, check_movement
 from sgimd_torch.spaces import Array, Box
 
-_TOLD: Final = ("primitive", "files", "remarks", "found_options", "at_once")  # optional members that stay as they are
+_KEPT: Final = ("primitive", "files", "remarks", "found_options")  # optional members that stay as they are
 
 
 class WithPrevious:
@@ -32,6 +32,8 @@ class WithPrevious:
         robot: robot with memory.
     """
 
+    at_once = 1  # of several robots, each has a movement before of its own
+
     def __init__(self, robot: Environment) -> None:
         self.robot = robot
         self.policies, self.outcomes = robot.policies, robot.outcomes
@@ -42,7 +44,7 @@ class WithPrevious:
         low, high = (np.concatenate([getattr(box, corner) for _, box in boxes]) for corner in ("low", "high"))
         self.contexts = Box(low, high, tuple(names))
         self._last: Array | None = None  # theta of the last movement; None: unknown
-        for name in _TOLD:
+        for name in _KEPT:
             if hasattr(robot, name):
                 setattr(self, name, getattr(robot, name))
         if (trace := getattr(robot, "trace", None)) is not None:

@@ -127,7 +127,8 @@ def ends_now(parts: RunParts, record: Record, movements: int, between: Callable[
     """Whether the learner expects, and makes, no larger error than --until says; it looks now and then.
 
     An inverse model does not know what it cannot see, such as the memory of a robot. So the answers to a few random
-    goals are executed before the run ends; nothing is learnt from them. The record keeps the larger of both errors.
+    goals are executed before the run ends; nothing is learnt from them. The record keeps the error that they made, plus
+    its standard error, or the expected one if that is larger.
     """
     config, learner = parts.config, parts.learner
     if record.about["ended_early"] is not None:
@@ -135,23 +136,21 @@ def ends_now(parts: RunParts, record: Record, movements: int, between: Callable[
     moments = range(0, movements + 1, LOOK_EVERY * max(1, movements // (10 * LOOK_EVERY)))[1:]
     if not (config.due(movements, moments) and len(learner.memory)):
         return False
-    known = parts.task.benchmark is not None or config.benchmark is not None
-    goals = parts.benchmark.goals if known else None
-    rng = stream(config.seed, "until", movements)
-    if goals is None:
-        goals = goals_reached(learner.inverse, rng)
+    known, rng = parts.task.benchmark or config.benchmark, stream(config.seed, "until", movements)
+    goals = parts.benchmark.goals if known else goals_reached(learner.inverse, rng)
     expected = expected_error(learner.inverse, goals, rng)
     assert config.until is not None
     if not expected <= config.until:  # or it is NaN
         return False
     tried = rng.permutation(goals)[:TRIED]
     evaluation = evaluate(learner.inverse, parts.environment, tried, config.seed, movements, repeats=0, between=between)
-    if evaluation.mean_error > config.until:
+    likely = evaluation.mean_error + float(evaluation.errors.std()) / math.sqrt(len(tried))
+    if likely > config.until:
         amount = parts.environment.outcomes.amount
         missed = f"{len(tried)} answers missed by {amount(evaluation.mean_error, '.4f')}"
         say(f"after {movements} movements {amount(expected, '.4f')} was expected, but {missed}: the run goes on")
         return False
-    record.about["ended_early"] = [movements, max(expected, evaluation.mean_error)]
+    record.about["ended_early"] = [movements, max(expected, likely)]
     return True
 
 
