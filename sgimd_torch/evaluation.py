@@ -222,14 +222,15 @@ def evaluate(
     # Repeats come last, so that errors do not depend on their number.
     order = np.concatenate([k * n + rng.permutation(n) for k in range(1 + repeats)])
     landed = _landed(environment, contexts, thetas, seed, f"evaluation {step}", order, look, between)
-    expected, (outcomes, *again) = expected_errors(answers[:n], goals), landed.reshape(1 + repeats, *goals.shape)
+    landed = landed.reshape(1 + repeats, *goals.shape)
+    outcomes, again = landed[0], landed[1:]
     failed = np.isnan(outcomes).any(axis=1)
     scatter = np.full(len(goals), np.nan)
     if repeats:
         bessel = np.sqrt(repeats / (repeats - 1))
-        scatter = bessel * np.linalg.norm(again - np.mean(again, axis=0), axis=2).mean(axis=0)
+        scatter = bessel * np.linalg.norm(again - again.mean(axis=0), axis=2).mean(axis=0)
     reached = np.where(np.isnan(outcomes), environment.rest, outcomes)
-    errors = np.linalg.norm(reached - goals, axis=1)
+    errors, expected = np.linalg.norm(reached - goals, axis=1), expected_errors(answers[:n], goals)
     return Evaluation(errors, thetas[:n], outcomes, scatter, contexts[:n], failed, expected)
 
 

@@ -11,7 +11,6 @@ from functools import partial
 from typing import Any
 
 from sgimd_torch.changes import check_watcher
-from sgimd_torch.environments.previous import with_previous
 from sgimd_torch.environments.protocol import Environment, FromFiles
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.learner import Learner
@@ -125,7 +124,11 @@ def task_of(config: Config) -> Task:
     """
     task = call_checked(f"environment {config['environment']}", config.constructor("environment"))
     task = task if isinstance(task, Task) else Task(task)
-    return replace(task, environment=with_previous(task.environment)) if config.context else task
+    if not config.context:
+        return task
+    from sgimd_torch.environments.previous import with_previous  # few robots have a memory
+
+    return replace(task, environment=with_previous(task.environment))
 
 
 def _needs_demonstrations(make: Callable[..., Any]) -> bool:

@@ -35,7 +35,7 @@ class Config:
         algorithm: learner, see below; the default needs no teacher, as an unknown robot has none.
         seed: random seed; two runs with equal options and an equal seed are equal.
         movements: number of movements, rests included.
-        until: mean error (unit of T) that ends the run once it is expected; null: none.
+        until: mean error (unit of T) that ends the run once it is expected, and made at 20 goals; null: none.
         teachers: names of teachers to ask; null: one with all demonstrations.
         out: folder for runs; a run with seed 3 goes to OUT/NAME/seed-003.
         name: name of the variant, NAME in the path of the run; null: the algorithm.

@@ -15,7 +15,6 @@ from functools import partial
 from pathlib import Path
 from typing import Final, Protocol, Self, runtime_checkable
 
-from sgimd_torch.changes.carried_over import error_knowing_previous
 from sgimd_torch.environments.protocol import FAILURES, SimulationError, reason_of
 from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.learner.events import Event, Kind
@@ -246,6 +245,8 @@ class RunLoop:
         config, learner = self.parts.config, self.parts.learner
         if self._told or config.context or config.at_once > 1 or not learner.inverse.says_how_sure:
             return
+        from sgimd_torch.changes.carried_over import error_knowing_previous  # short runs do not need it
+
         with self.seconds.of("learner"):
             share = error_knowing_previous(learner)
         if share is not None:
