@@ -35,7 +35,7 @@ class Config:
         algorithm: learner, see below; the default needs no teacher, as an unknown robot has none.
         seed: random seed; two runs with equal options and an equal seed are equal.
         movements: number of movements, rests included.
-        until: mean error (unit of T) that ends the run once it is expected, and made at 20 goals; null: none.
+        until: mean error (unit of T) that ends the run once it is expected; null: none.
         teachers: names of teachers to ask; null: one with all demonstrations.
         out: folder for runs; a run with seed 3 goes to OUT/NAME/seed-003.
         name: name of the variant, NAME in the path of the run; null: the algorithm.
@@ -51,7 +51,7 @@ class Config:
         begin_with: run.sqlite or csv of another robot or simulator to begin with; null: none.
         failures: number of failed movements in a row that stops the run; null: 10.
         at_once: number of robots that move at once; after each 30 movements one more robot joins.
-        context: previous: the theta of the movement before is a context, for robots with memory; null: it is not.
+        context: previous: theta of the movement before, for robots with memory; null: no theta.
         parts: parts and their options by name, such as "goals" or "goals.window"; defaults may be left out.
 
     Raises:
