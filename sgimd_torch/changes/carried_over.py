@@ -1,8 +1,8 @@
 """A robot with memory: do outcomes depend on the movement before?
 
-Our addition. Each outcome is predicted from all other movements by three processes: one knows context and theta alone,
-one the theta of the movement before, too, and one that of a random other movement in its place. If the second predicts
-clearly better than both others, outcomes depend on the movement before.
+Our addition. Each outcome is predicted from all other movements twice: from context and theta alone, and with the theta
+of the movement before as a further input. Predictions become worse with an input that has no effect. So if they become
+clearly better, outcomes depend on the movement before.
     share = error_knowing_previous(learner)
 """
 
@@ -19,7 +19,7 @@ from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Learner
 from sgimd_torch.learner.events import Kind
 from sgimd_torch.parts import Problem
-from sgimd_torch.spaces import Array, stream
+from sgimd_torch.spaces import Array
 
 _FEWEST: Final = 16  # least number of movements, the number to which a process is first fitted
 _WORTH: Final = 0.9  # largest share of the error that is told; small gains may come from another fit of the kernel
@@ -40,13 +40,11 @@ def error_knowing_previous(learner: Learner) -> float | None:
         return None
     thetas, movements = zip(*pairs, strict=True)
     alone, before = Exemplars(*map(np.array, zip(*movements, strict=True))), np.array(thetas)
-    shuffled = stream(len(before), "movements before").permutation(before)
-    knowing, misled = (alone._replace(contexts=np.hstack((known, alone.contexts))) for known in (before, shuffled))
-    errors = [_left_out(learner.problem, exemplars) for exemplars in (knowing, alone, misled)]
-    best, *others = errors
-    if any(better(of_one, best, learner.problem.outcome_noise) < SURE for of_one in others):
+    knowing = alone._replace(contexts=np.hstack((before, alone.contexts)))
+    errors, errors_knowing = (_left_out(learner.problem, exemplars) for exemplars in (alone, knowing))
+    if better(errors, errors_knowing, learner.problem.outcome_noise) < SURE:
         return None
-    share = float(np.sqrt(best.mean() / others[0].mean()))
+    share = float(np.sqrt(errors_knowing.mean() / errors.mean()))
     return share if share < _WORTH else None
 
 
