@@ -18,7 +18,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sgimd_torch.environments.protocol import BatchEnvironment, Environment, execute_many, observed
+from sgimd_torch.environments.protocol import BatchEnvironment, Environment, execute_many, observed, tried
 from sgimd_torch.files import read_npz, write_npz
 from sgimd_torch.parts import Inverse
 from sgimd_torch.spaces import Array, Box, Estimate, Failure, check_count, check_vector, first_entry, stream
@@ -73,8 +73,8 @@ class Evaluation:
         errors: ``(n,)``, distance of the outcome from the goal; of ``rest`` from the goal if the movement failed.
         thetas: ``(n, theta_dim)``, executed movements.
         outcomes: ``(n, outcome_dim)``; NaN if the movement failed.
-        scatter: ``(n,)``, estimated mean distance of the repeated outcomes of a theta from their true mean; NaN if
-            there are no repeats.
+        scatter: ``(n,)``, estimated mean distance of the repeated outcomes at a goal from their true mean; NaN if there
+            are no repeats.
         contexts: ``(n, context_dim)``, contexts of the movements.
         failed: ``(n,)``, whether the movement failed.
         expected: ``(n,)``, errors that the inverse model expected; NaN if it does not say how sure it is.
@@ -151,7 +151,11 @@ def contexts_of_goals(environment: Environment, n: int) -> Array:
     """``(n, context_dim)``, an observed context for each goal, equal in all evaluations, so comparisons are paired."""
     if environment.contexts.dim == 0:
         return np.zeros((n, 0))
-    return np.stack([observed(environment, stream(0, "contexts of evaluation", goal)) for goal in range(n)])
+    return np.stack([_context_of_goal(environment, goal) for goal in range(n)])
+
+
+def _context_of_goal(environment: Environment, goal: int) -> Array:
+    return observed(environment, stream(0, "contexts of evaluation", goal))
 
 
 def evaluate(
@@ -167,7 +171,9 @@ def evaluate(
 ) -> Evaluation:
     """Execute the answer to every goal once, and ``repeats`` times more to measure the noise.
 
-    Two inverse models evaluated with equal ``seed`` and ``step`` get equal noise, goal by goal.
+    Two inverse models evaluated with equal ``seed`` and ``step`` get equal noise, goal by goal. The order of movements
+    is random, so that the noise of a robot with memory shows. Each context is observed again before its movement; if it
+    has changed, as a state of the robot does, the goal is answered anew.
 
     Args:
         inverse: inverse model, whose ``answer_many`` is called; its memory must not be empty.
@@ -197,10 +203,25 @@ def evaluate(
     else:
         given = environment.contexts.check("context", context)
         contexts = np.broadcast_to(given, (len(goals), environment.contexts.dim))
-    answers = inverse.answer_many(contexts, goals)
-    thetas, expected = np.stack([answer.theta for answer in answers]), expected_errors(answers, goals)
-    copies = np.tile(thetas, (1 + repeats, 1))  # repeats come last, so that errors do not depend on their number
-    landed = _landed(environment, np.tile(contexts, (1 + repeats, 1)), copies, seed, f"evaluation {step}", between)
+    answers, n = [*inverse.answer_many(contexts, goals)] * (1 + repeats), len(goals)
+    thetas, contexts = np.stack([answer.theta for answer in answers]), np.tile(contexts, (1 + repeats, 1))
+
+    def look(row: int) -> bool:
+        """Answer anew if the context of a movement has changed; False: the robot cannot see it."""
+        if context is not None or not environment.contexts.dim or isinstance(environment, BatchEnvironment):
+            return True
+        seen = tried("context", environment.contexts.dim, _context_of_goal, environment, row % n)
+        if isinstance(seen, Failure):
+            return False
+        if not np.array_equal(seen, contexts[row]):
+            answers[row] = inverse(seen, goals[row % n])
+            contexts[row], thetas[row] = seen, answers[row].theta
+        return True
+
+    rng = stream(seed, f"order of evaluation {step}")
+    # Repeats come last, so that errors do not depend on their number.
+    order = np.concatenate([k * n + rng.permutation(n) for k in range(1 + repeats)])
+    landed = _landed(environment, contexts, thetas, seed, f"evaluation {step}", order, look, between)
     landed = landed.reshape(1 + repeats, *goals.shape)
     outcomes, again = landed[0], landed[1:]
     failed = np.isnan(outcomes).any(axis=1)
@@ -209,7 +230,8 @@ def evaluate(
         bessel = np.sqrt(repeats / (repeats - 1))
         scatter = bessel * np.linalg.norm(again - again.mean(axis=0), axis=2).mean(axis=0)
     reached = np.where(np.isnan(outcomes), environment.rest, outcomes)
-    return Evaluation(np.linalg.norm(reached - goals, axis=1), thetas, outcomes, scatter, contexts, failed, expected)
+    errors, expected = np.linalg.norm(reached - goals, axis=1), expected_errors(answers[:n], goals)
+    return Evaluation(errors, thetas[:n], outcomes, scatter, contexts[:n], failed, expected)
 
 
 def expected_errors(answers: Sequence[Estimate], goals: Array) -> Array:
@@ -218,16 +240,26 @@ def expected_errors(answers: Sequence[Estimate], goals: Array) -> Array:
 
 
 def _landed(
-    environment: Environment, contexts: Array, thetas: Array, seed: int, name: str, between: Callable[[], object]
+    environment: Environment,
+    contexts: Array,
+    thetas: Array,
+    seed: int,
+    name: str,
+    order: NDArray[np.int_],
+    look: Callable[[int], bool],
+    between: Callable[[], object],
 ) -> Array:
-    """Outcomes ``(n, outcome_dim)``, NaN for a failed movement; movement i has stream i of this ``name``."""
+    """Outcomes ``(n, outcome_dim)``, NaN for a failed movement; movement i has stream i of this ``name``.
+
+    Before a movement, ``look`` may change its context and theta, or say that there is none.
+    """
     landed = np.full((len(thetas), environment.outcomes.dim), np.nan)
     together = TOGETHER if isinstance(environment, BatchEnvironment) else 1
-    allowed = np.flatnonzero(environment.policies.contains(thetas)).tolist()  # no other theta may go to a robot
-    waiting = [allowed[start : start + together] for start in range(0, len(allowed), together)][::-1]
+    waiting = [order[start : start + together].tolist() for start in range(0, len(order), together)][::-1]
     while waiting:
         between()
-        rows = waiting.pop()
+        # No theta outside Pi may go to a robot.
+        rows = [row for row in waiting.pop() if look(row) and environment.policies.contains(thetas[row])]
         rngs = [stream(seed, name, row) for row in rows]
         outcomes = execute_many(environment, contexts[rows], thetas[rows], rngs)
         if len(rows) > 1 and all(isinstance(outcome, Failure) for outcome in outcomes):

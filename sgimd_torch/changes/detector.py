@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from sgimd_torch.changes.calibration import Calibration, by_halves
-from sgimd_torch.changes.eras import NEAR, Era, Exemplars, squared
+from sgimd_torch.changes.eras import NEAR, SURE, Era, Exemplars, better, gains_over, squared
 from sgimd_torch.inverses.gaussian_process import one_thread
 from sgimd_torch.inverses.local_process import LocalProcess, predictions
 from sgimd_torch.memory import Memory, Rows
@@ -33,11 +33,9 @@ _TESTED_AFTER: Final = (16, 24, 36, 54, 81, 122, 182, 273)
 _EVERY: Final = 64  # number of movements between two tests without a suspicion
 _SLOW: Final = 128  # number of last movements that such a test compares
 _FAILED: Final = 6.0  # squared error, relative to the expected one, above which a prediction has failed
-_SURE: Final = 3.5  # statistic T from which on a test is passed
-_LARGEST_GAIN: Final = 1.5  # bound of the log ratio of two errors
 _TESTED: Final = 128  # largest number of newest movements that are tested
 _ERAS: Final = 3  # largest number of earlier eras that are kept
-_SURER: Final = 0.5  # largest variance of the outcome of an earlier exemplar now, relative to its variance without it
+SURER: Final = 0.5  # largest variance of the outcome of an earlier exemplar now, relative to its variance without it
 _GROWTH: Final = 2  # factor of the length of an era from one comparison with earlier eras to the next
 _FIRST_REVIEW: Final = 8  # number of movements at the first such comparison with a prior
 _ALONE: Final = 24  # least number of movements that get lengths and kernel of their own
@@ -151,7 +149,7 @@ class ChangeDetector:
             return 0
         recent = Era(fitted, Exemplars.of(process.memory, slice(-n_last, None)))
         errors, _ = recent.left_out(np.arange(n_last))
-        return n_last if self._better(np.array(self._errors[-n_last:]), errors) >= _SURE else 0
+        return n_last if better(np.array(self._errors[-n_last:]), errors, self.noise) >= SURE else 0
 
     @one_thread
     def _changed(self, process: LocalProcess, n_last: int) -> int:
@@ -168,23 +166,13 @@ class ChangeDetector:
         of_each_other, _ = Era(fitted, tested).left_out(np.arange(len(rows)))
         for errors in (of_each_other, by_halves(earlier, self.problem.policies, tested)):
             for some in (slice(None), as_it_was > failed):  # a local change is seen in those that failed
-                if all(self._better(unchanged_errors[some], errors[some]) >= _SURE for unchanged_errors in unchanged):
+                if all(better(of_one[some], errors[some], self.noise) >= SURE for of_one in unchanged):
                     # The suspicion may have begun too early: the first movements then fit the old era better.
                     gains = np.zeros(len(rows))
-                    gains[some] = self._gains(as_it_was, errors)[some]
+                    gains[some] = gains_over(as_it_was, errors, self.noise)[some]
                     n_changed = 1 + int(gains[::-1].cumsum().argmax())
                     return n_last if n_changed == len(rows) else n_changed
         return 0
-
-    def _gains(self, errors: Array, other_errors: Array) -> Array:
-        """By how much others predict better: log ratios of errors; noise limits both."""
-        floor = self.noise**2 + 1e-300
-        return np.clip(0.5 * np.log((errors + floor) / (other_errors + floor)), -_LARGEST_GAIN, _LARGEST_GAIN)
-
-    def _better(self, errors: Array, other_errors: Array) -> float:
-        """T, self-normalised: how sure it is that others predict better."""
-        gains = self._gains(errors, other_errors)
-        return float(gains.sum() / np.sqrt(squared(gains) + 1e-300))
 
     @one_thread
     def _restart(self, *, is_new: bool) -> Restart:
@@ -198,13 +186,13 @@ class ChangeDetector:
             errors = [era.errors(tested)]
             errors += [by_halves(era, self.problem.policies, tested)] if n >= _CALIBRATED else []
             for calibration, era_errors in enumerate(errors):
-                if (gain := float(self._gains(own_errors, era_errors).mean())) > best:
+                if (gain := float(gains_over(own_errors, era_errors, self.noise).mean())) > best:
                     best, chosen, calibrated, alone = gain, era, bool(calibration), own_errors
         if self._eras:
             self._eras = [*(era for era in self._eras if era is not chosen), chosen]
             helpful, n_before = self._helpful(chosen, calibrated, current, tested_rows), len(chosen.exemplars.thetas)
             together, _ = self._process(helpful.and_then(current), chosen).left_out(len(helpful.thetas) + tested_rows)
-            kept = helpful if self._gains(alone, together).mean() >= 0 else kept
+            kept = helpful if gains_over(alone, together, self.noise).mean() >= 0 else kept
         self._review, self._errors = _GROWTH * n if len(kept.thetas) else 0, []
         if is_new:
             self._reset_suspicion()
@@ -231,7 +219,7 @@ class ChangeDetector:
         correction, variances, _ = of_unexplained.predict(before)
         variances_alone = alone.predict(before)[1] * alone.inflation(tested_rows)
         corrected = before._replace(outcomes=before.outcomes + correction)
-        return corrected.some(variances * of_unexplained.inflation(tested_rows) < _SURER * variances_alone)
+        return corrected.some(variances * of_unexplained.inflation(tested_rows) < SURER * variances_alone)
 
 
 def _fourth_fifth(values: list[float]) -> float:

@@ -17,6 +17,8 @@ from sgimd_torch.memory.table import Table
 from sgimd_torch.spaces import Array
 
 NEAR: Final = 60  # largest number of exemplars from which a movement is predicted
+SURE: Final = 3.5  # statistic T from which on a test is passed
+_LARGEST_GAIN: Final = 1.5  # bound of the log ratio of two errors
 
 
 class Exemplars(NamedTuple):
@@ -92,3 +94,16 @@ class Era:
 def squared(differences: Array) -> Array:
     """Squared lengths of vectors, over the last axis."""
     return np.asarray((differences * differences).sum(axis=-1))
+
+
+def gains_over(errors: Array, other_errors: Array, noise: float) -> Array:
+    """By how much others predict better, ``(n,)``: log ratios of squared errors; the standard deviation of the
+    ``noise`` limits both."""
+    floor = noise**2 + 1e-300
+    return np.clip(0.5 * np.log((errors + floor) / (other_errors + floor)), -_LARGEST_GAIN, _LARGEST_GAIN)
+
+
+def better(errors: Array, other_errors: Array, noise: float) -> float:
+    """T, self-normalised: how sure it is that others predict better."""
+    gains = gains_over(errors, other_errors, noise)
+    return float(gains.sum() / np.sqrt(squared(gains) + 1e-300))

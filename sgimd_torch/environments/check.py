@@ -11,6 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from sgimd_torch.environments.previous import WithPrevious
 from sgimd_torch.environments.protocol import BatchEnvironment, Environment, check_instance, check_robot
 from sgimd_torch.spaces import Array, Box, check_count, stream
 
@@ -145,7 +146,7 @@ def _repeats(environment: Environment, tried: Movements) -> Iterator[str]:
     if not np.array_equal(first, kept):
         yield _used_twice("execute()")
     last = _call(environment, "execute", context, theta, stream(1, "execute"))
-    if np.array_equal(kept, again):  # else a remark says it already
+    if np.array_equal(kept, again) or np.abs(kept - last).max() > _rounding(environment):  # else a remark says it
         yield from _differ(
             environment, kept, last, f"execute() gave {_text(kept)}, but {_text(last)} after another movement"
         )
@@ -154,8 +155,14 @@ def _repeats(environment: Environment, tried: Movements) -> Iterator[str]:
 def _differ(environment: Environment, one: Array, other: Array, seen: str) -> Iterator[str]:
     """A remark if two outcomes of a movement differ by rounding, a broken promise if they differ by more."""
     apart = float(np.abs(one - other).max())
-    if apart > _rounding(environment):
-        yield f"{seen}: state carries over; does each movement reset positions, speeds and filters?"
+    if apart > _rounding(environment) and isinstance(environment, WithPrevious):
+        yield _Remark(f"{seen}: outcomes depend on older movements than the one before, too")
+    elif apart > _rounding(environment):
+        yield (
+            f"{seen}: state carries over; does each movement reset positions, speeds and filters? If nothing can, "
+            "outcomes depend on the movement before: give it as context (--context previous), or return to the same "
+            "state first"
+        )
     elif apart:
         yield _Remark(
             f"a repeated movement with an equal stream ends {apart:.2g} away, as by rounding: "
@@ -169,10 +176,10 @@ def _rounding(environment: Environment) -> float:
 
 def _noise(environment: Environment, tried: Movements) -> Iterator[str]:
     announced, dim = float(environment.outcome_noise), environment.outcomes.dim
-    pairs = [
-        [_call(environment, "execute", *movement, stream(k, "execute")).copy() for k in (1, 2)] for movement in tried
-    ]
-    scatter = np.sqrt([np.mean(np.square(one - other)) / 2 for one, other in pairs])
+    # The second time in another order, so that what a robot remembers counts as noise.
+    once = [_call(environment, "execute", *movement, stream(1, "execute")).copy() for movement in tried]
+    again = [_call(environment, "execute", *movement, stream(2, "execute")).copy() for movement in tried[::-1]]
+    scatter = np.sqrt([np.mean(np.square(one - other)) / 2 for one, other in zip(once, again[::-1], strict=True)])
     negligible = announced <= _rounding(environment)  # as the trembling of a thing at rest in a simulation
     noisy = scatter[scatter > (_rounding(environment) if negligible else 0)]
     if not len(noisy):

@@ -6,7 +6,7 @@ parts = build(Config(seed=3)); for episode in run(parts.learner, parts.environme
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -134,7 +134,12 @@ def task_of(config: Config) -> Task:
         ValueError: the environment cannot be built, or is no environment.
     """
     task = call_checked(f"environment {config['environment']}", config.constructor("environment"))
-    return task if isinstance(task, Task) else Task(task)
+    task = task if isinstance(task, Task) else Task(task)
+    if not config.context:
+        return task
+    from sgimd_torch.environments.previous import with_previous  # few robots have a memory
+
+    return replace(task, environment=with_previous(task.environment))
 
 
 def _needs_demonstrations(make: Callable[..., Any]) -> bool:

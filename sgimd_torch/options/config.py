@@ -53,6 +53,7 @@ class Config:
         begin_with: run.sqlite or csv of another robot or simulator to begin with; null: none.
         failures: number of failed movements in a row that stops the run; null: 10.
         at_once: number of robots that move at once; after each 30 movements one more robot joins.
+        context: previous: theta of the movement before, for robots with memory; null: no theta.
         parts: parts and their options by name, such as "goals" or "goals.window"; defaults may be left out.
 
     Raises:
@@ -77,6 +78,7 @@ class Config:
     begin_with: Path | None = None
     failures: int | None = None
     at_once: int = 1
+    context: str | None = None
     parts: Mapping[str, Any] | tuple[tuple[str, Any], ...] = ()
 
     def __post_init__(self) -> None:
@@ -98,6 +100,10 @@ class Config:
                 raise ValueError(f"{name} must be at least {least}, got {as_text(value)}")
         if self.movements > MOST_MOVEMENTS:
             raise ValueError(f"movements must be at most {MOST_MOVEMENTS}, got {self.movements}")
+        if self.context not in (None, "previous"):
+            raise ValueError(f"context must be previous or null, got {self.context}; is it an option of sgimd ask?")
+        if self.context and self.teaching:
+            raise ValueError("context previous: the movement before a demonstration is not known; use no teacher")
         if self.until is not None and not 0 < self.until < math.inf:
             raise ValueError(f"until must be an error above 0, in the unit of T, got {self.until}")
         if self.repeats == 1:

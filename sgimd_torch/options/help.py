@@ -33,7 +33,6 @@ def overview(description: str | None) -> str:
         _line("for comparison", f"{', '.join(rivals)}; these need the extra rivals"),
         "names for the parts of a run; for a part of your own, type package.module:attribute:",
         *(_line(f"--{option}", ", ".join(words)) for option, words in parts.items()),
-        "",
         "Parts have options, too, such as --goals.window 12; to see them: sgimd run --goals interest-map --help",
     ]
     return "\n".join(lines)

@@ -18,7 +18,7 @@ from typing import Final, Protocol, Self, runtime_checkable
 from sgimd_torch.environments.protocol import FAILURES, SimulationError, reason_of
 from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.learner.events import Event, Kind
-from sgimd_torch.options.build import RunParts
+from sgimd_torch.options.build import RunParts, task_of
 from sgimd_torch.record import ReplayError, Row, RunError
 from sgimd_torch.runs.directory import open_run
 from sgimd_torch.runs.evaluations import Evaluations, ends_now
@@ -27,6 +27,7 @@ from sgimd_torch.session import Execute, NoOutcomeError, live, run
 from sgimd_torch.spaces import Episode
 
 N_TOLD: Final = 3  # number of failures with a message each; later ones are only counted
+LOOKED_BACK: Final = (50, 100, 200)  # numbers of movements at which to test whether the robot has a memory
 COMMIT_EVERY: Final = 1.0  # s between two commits; a killed run loses the movements since the last commit
 
 
@@ -100,6 +101,7 @@ class RunLoop:
             self.listeners.append(board)
         self._wanted = parts.config.evaluations  # numbers of movements before the evaluations to come
         self._committed_at, self._kept, self._told = time.monotonic(), self.recorded, False  # at the last commit
+        self._remembers = False  # whether it was said that the robot has a memory
 
     def __enter__(self) -> Self:
         return self
@@ -162,8 +164,8 @@ class RunLoop:
         if config.at_once > 1:
             from sgimd_torch.runs import at_once  # most runs have one robot
 
-            robot = parts.environment, config.constructor("environment")
-            executing = at_once.executing(*robot, config.seed, config.at_once)
+            make = partial(task_of, config)
+            executing = at_once.executing(parts.environment, make, config.seed, config.at_once)
         with executing as execute:
             episodes = run(
                 parts.learner,
@@ -239,16 +241,34 @@ class RunLoop:
             self._evaluate()
         if self.movements == self.recorded:
             self._begin()
+        if not replayed and self.movements in LOOKED_BACK:
+            self._look_back()
         if not self.replaying and time.monotonic() - self._committed_at >= COMMIT_EVERY:
             self.commit()
+
+    def _look_back(self) -> None:
+        """Say once if outcomes depend on the movement before."""
+        config, learner = self.parts.config, self.parts.learner
+        if self._remembers or config.context or config.at_once > 1 or not learner.inverse.says_how_sure:
+            return
+        from sgimd_torch.changes.carried_over import error_knowing_previous  # short runs do not need it
+
+        with self.seconds.of("learner"):
+            share = error_knowing_previous(learner)
+        if share is not None:
+            self._remembers = True
+            say(
+                f"outcomes depend on the movement before, which would explain {1 - share:.0%} of the error of "
+                "predictions: give it as context (--context previous), or return to the same state before each movement"
+            )
 
     def _ends_early(self) -> bool:
         """Whether --until ends the run now; then there is a last evaluation."""
         config = self.parts.config
         if config.until is None or self.replaying or not self._all_told or self.movements >= config.movements:
             return False
-        with self.seconds.of("learner"):
-            ends = ends_now(self.parts, self.record, self.movements)
+        with self.seconds.of("evaluation"):
+            ends = ends_now(self.parts, self.record, self.movements, self.evaluations.between)
         if ends and config.evaluations:
             self.evaluations.parts = replace(self.parts, config=replace(config, movements=self.movements))
             self._evaluate()

@@ -74,7 +74,7 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument("run", type=Path, help="directory of a run: OUT/NAME/seed-003")
     parser.add_argument("--goal", type="numbers", action="append", default=[], metavar="X,Y", help="point of T")
     parser.add_argument("--goals", type=Path, metavar="FILE", help="table of goals, with commas, one goal a line")
-    middle = "context of all goals (default: the middle of C)"
+    middle = "context of all goals (default: the middle of C); with --context previous of the run, the last theta"
     parser.add_argument("--context", type="numbers", metavar="X,Y", help=middle)
     parser.add_argument("--execute", action="store_true", help="execute each answer on the robot of the run")
     parser.add_argument("--out", type=Path, metavar="FILE", help="csv file to write, with a line for each goal")
@@ -88,6 +88,9 @@ def _answers(
     parts: RunParts, goals: Sequence[Sequence[float]], given: Sequence[float] | None, *, execute: bool
 ) -> Iterator[Answer]:
     robot, inverse = parts.environment, parts.learner.inverse
+    if given is None and parts.config.context:
+        names = ", ".join(robot.contexts.names)
+        raise ValueError(f"--context must be given, as the run has --context previous; it is: {names}")
     middle = (robot.contexts.low + robot.contexts.high) / 2
     context = robot.contexts.check("--context", middle if given is None else given)
     if not len(parts.learner.memory):

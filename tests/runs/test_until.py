@@ -32,21 +32,20 @@ def whole(tmp_path_factory):
 def early(tmp_path_factory):
     """A run that ended early."""
     out = tmp_path_factory.mktemp("early")
-    assert go(out, "--until=0.02") == 0
+    assert go(out, "--until=0.03") == 0
     return out
 
 
 def test_a_run_ends_as_soon_as_the_expected_error_is_small_and_is_finished(early, whole):
     run = read_run(path_of(early))
     n = run.summary["movements"]
-    assert (n, run.summary["finished"], run.config["movements"]) == (200, True, 260)
+    assert (n, run.summary["finished"], run.config["movements"]) == (150, True, 260)
     assert run.evaluation["movements"].tolist() == [120, n]  # the last evaluation is that of the end, with its noise
     assert np.isfinite(run.evaluation["noise_floor"]).tolist() == [False, True]
-    assert run.summary["expected"] == pytest.approx(run.at(n, "expected_error"), rel=1e-9)  # at the same goals
-    assert run.summary["expected"] <= 0.06
+    assert run.at(n, "expected_error") <= run.summary["expected"] <= 0.03  # the larger of what it expects and makes
     assert content_of(path_of(early))["events"] == whole["events"][:n]  # looking changes nothing
     config = Config(
-        seed=3, movements=260, until=0.02, evaluate_at=(120,), out=early, parts={"environment": "planar-arm-7"}
+        seed=3, movements=260, until=0.03, evaluate_at=(120,), out=early, parts={"environment": "planar-arm-7"}
     )
     assert finished(config)
 
@@ -62,22 +61,22 @@ def test_the_expected_error_is_the_one_that_is_found(early):
 @pytest.mark.parametrize("words", [[], ["--movements=400"]])
 def test_a_run_that_ended_early_stays_ended_when_it_is_resumed(early, words, capsys):
     before = content_of(path_of(early))
-    assert go(early, "--until=0.02", "--resume", *words) == 0
-    assert "200 movements, mean error" in capsys.readouterr().out
+    assert go(early, "--until=0.03", "--resume", *words) == 0
+    assert "150 movements, mean error" in capsys.readouterr().out
     assert content_of(path_of(early)) == before
     assert read_run(path_of(early)).summary["finished"]
 
 
 def test_without_its_limit_or_with_a_lower_one_the_run_goes_on_as_if_it_had_never_ended(tmp_path, whole):
-    assert go(tmp_path, "--until=0.02") == 0
+    assert go(tmp_path, "--until=0.03") == 0
     assert go(tmp_path, "--until=1e-9", "--resume") == 0
     assert content_of(path_of(tmp_path)) == whole
     assert about_of(path_of(tmp_path))["ended_early"] is None
 
 
 def test_a_run_killed_at_its_end_ends_there_when_it_is_resumed(early, tmp_path):
-    words = [*ARM.split(), f"--out={tmp_path}", "--until=0.02"]
-    end(stopped_at(200, *words))
+    words = [*ARM.split(), f"--out={tmp_path}", "--until=0.03"]
+    end(stopped_at(150, *words))
     assert not read_run(path_of(tmp_path)).summary["finished"]
     assert command(main, [*words, "--resume"]) == 0
     assert content_of(path_of(tmp_path)) == content_of(path_of(early))
@@ -109,5 +108,12 @@ class Sure(Inverse):
 
 def test_an_inverse_model_of_a_users_own_that_says_how_sure_it_is_ends_the_run(tmp_path, module):
     module("confident", SURE)
-    assert go(tmp_path, "--until=0.02", "--inverse=confident:Sure") == 0
+    assert go(tmp_path, "--until=0.5", "--inverse=confident:Sure") == 0
     assert read_run(path_of(tmp_path)).summary["movements"] == 50
+
+
+def test_a_run_goes_on_while_answers_miss_by_more_than_its_limit_whatever_is_expected(tmp_path, module, capsys):
+    module("confident", SURE)
+    assert go(tmp_path, "--until=0.02", "--inverse=confident:Sure") == 0
+    assert read_run(path_of(tmp_path)).summary["movements"] == 260
+    assert "after 50 movements 0.0125 m was expected, but 20 answers missed by 0." in capsys.readouterr().err

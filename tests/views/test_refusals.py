@@ -31,6 +31,7 @@ def place(tmp_path_factory):
     sys.path.insert(0, str(folder))
     runs = {
         "runs": "Slider2 --movements 60 --evaluate-at []",
+        "memory": "Slider2 --movements 20 --evaluate-at [] --context previous",
         "odd": "Slider3 --movements 20 --evaluate-at []",
         "mixed": "Slider2 --movements 40 --evaluate-at 20",
         "mixed --name other": "Slider2 --movements 50 --evaluate-at 30",
