@@ -18,7 +18,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sgimd_torch.environments.protocol import BatchEnvironment, Environment, execute_many, observed
+from sgimd_torch.environments.protocol import Environment, execute_many, moves_in_batches, observed
 from sgimd_torch.files import read_npz, write_npz
 from sgimd_torch.parts import Inverse
 from sgimd_torch.spaces import Array, Box, Estimate, Failure, check_count, check_vector, first_entry, stream
@@ -222,7 +222,7 @@ def _landed(
 ) -> Array:
     """Outcomes ``(n, outcome_dim)``, NaN for a failed movement; movement i has stream i of this ``name``."""
     landed = np.full((len(thetas), environment.outcomes.dim), np.nan)
-    together = TOGETHER if isinstance(environment, BatchEnvironment) else 1
+    together = TOGETHER if moves_in_batches(environment) else 1
     allowed = np.flatnonzero(environment.policies.contains(thetas)).tolist()  # no other theta may go to a robot
     waiting = [allowed[start : start + together] for start in range(0, len(allowed), together)][::-1]
     while waiting:

@@ -68,14 +68,16 @@ def check_vector(name: str, value: ArrayLike, dim: int, hint: str = "") -> Array
         if with_itself < 1e199:
             return value
     hint = f"; {hint}" if hint else ""
+    wanted = f"{name} must be real numbers of shape (..., {dim})"
+    parts = value if isinstance(value, list | tuple) else (value,)
+    if any(isinstance(part, np.ma.MaskedArray) for part in parts):  # numpy would take what it hides
+        raise ValueError(f"{wanted}, got a masked array {_in_short(value)}{hint}")
     try:
         array = np.asarray(value)
     except (TypeError, ValueError) as error:
-        raise ValueError(f"{name} must be real numbers of shape (..., {dim}), got {_in_short(value)}{hint}") from error
-    masked = isinstance(value, np.ma.MaskedArray)
-    if masked or array.dtype.kind not in "fiu":
-        kind = "a masked array" if masked else array.dtype
-        raise ValueError(f"{name} must be real numbers of shape (..., {dim}), got {kind} {_in_short(value)}{hint}")
+        raise ValueError(f"{wanted}, got {_in_short(value)}{hint}") from error
+    if array.dtype.kind not in "fiu":
+        raise ValueError(f"{wanted}, got {array.dtype} {_in_short(value)}{hint}")
     if array.ndim == 0 or array.shape[-1] != dim:
         raise ValueError(f"{name} must have shape (..., {dim}), got {array.shape}{hint}")
     array = array.astype(np.float64, copy=False)

@@ -137,7 +137,7 @@ class FromGymnasium:
         """The context of the start with this ``seed``."""
         assert self._context is not None
         first, _ = self.world.reset(seed=seed)
-        return check_point("context", np.array(self._context(first), dtype=np.float64), self.contexts.dim)
+        return check_point("context", np.array(np.ma.filled(self._context(first), np.nan), dtype=np.float64), self.contexts.dim)
 
     @cached_property
     def _seeds(self) -> dict[bytes, int]:
@@ -161,7 +161,7 @@ class FromGymnasium:
         warned = getattr(getattr(self.world.unwrapped, "data", None), "warning", None)
         if warned is not None and np.any(warned.number):
             raise SimulationError("MuJoCo gave a warning: the simulation diverged, or ran out of room", theta)
-        outcome = np.array(self._outcome(observations), dtype=np.float64)
+        outcome = np.array(np.ma.filled(self._outcome(observations), np.nan), dtype=np.float64)
         if not np.isfinite(outcome).all():
             raise SimulationError("the outcome is not finite", theta)
         return check_point("outcome", outcome, self.outcomes.dim)

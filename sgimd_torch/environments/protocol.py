@@ -11,7 +11,7 @@ import traceback
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final, Protocol, runtime_checkable
+from typing import Any, Final, Protocol, TypeGuard, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -66,7 +66,11 @@ class Environment(Protocol):
 
 @runtime_checkable
 class BatchEnvironment(Environment, Protocol):
-    """An environment that executes many movements faster together than one by one."""
+    """An environment that executes many movements faster together than one by one.
+
+    The method counts if it is defined beside ``execute`` or below: a subclass with an ``execute`` of its own moves one
+    by one, unless it has its own ``execute_many``, too.
+    """
 
     def execute_many(self, contexts: Array, thetas: Array, rngs: Sequence[np.random.Generator]) -> Array:
         """``(n, outcome_dim)``, row i equal to ``execute(contexts[i], thetas[i], rngs[i])`` bit for bit.
@@ -163,6 +167,21 @@ class SimulationError(RuntimeError):
         return self.reason if self.theta is None else f"{self.reason}; theta={np.asarray(self.theta).tolist()}"
 
 
+def beside_execute(environment: object, name: str) -> bool:
+    """Whether the method ``name`` counts: it is defined beside ``execute`` or below it, so it is of the same robot.
+
+    Else a subclass or a wrapper has its own ``execute``, and the method would give the outcomes of its parent.
+    """
+    layers = [getattr(environment, "__dict__", {}), *map(vars, type(environment).__mro__)]
+    level, own = (next((k for k, layer in enumerate(layers) if member in layer), len(layers)) for member in (name, "execute"))
+    return getattr(environment, name, None) is not None and level <= own
+
+
+def moves_in_batches(environment: object) -> TypeGuard[BatchEnvironment]:
+    """Whether ``execute_many`` of the environment counts, see `beside_execute`."""
+    return isinstance(environment, BatchEnvironment) and beside_execute(environment, "execute_many")
+
+
 def observed(environment: Environment, rng: np.random.Generator) -> Array:
     """The context ``(context_dim,)`` that the environment observes; one outside C by rounding is clipped, and told.
 
@@ -212,16 +231,28 @@ def execute_many(
         rngs: a stream for each movement, so that no outcome depends on other movements.
     """
     n, dim = len(thetas), environment.outcomes.dim
-    if n > 1 and isinstance(environment, BatchEnvironment):
+    if n > 1 and moves_in_batches(environment):
         try:
-            outcomes = np.asarray(environment.execute_many(np.array(contexts), np.array(thetas), rngs))
-            if outcomes.shape != (n, dim):
-                raise ValueError(f"execute_many() must give {n} outcomes in rows, ({n}, {dim}), got {outcomes.shape}")
+            outcomes: Any = environment.execute_many(np.array(contexts), np.array(thetas), rngs)
+            if (shape := np.shape(outcomes)) != (n, dim):
+                raise ValueError(f"execute_many() must give {n} outcomes in rows, ({n}, {dim}), got {shape}")
         except (Exception, SystemExit) as error:
             return [Failure(reason_of(error), error)] * n
-        return [tried("outcome", dim, np.copy, outcome) for outcome in outcomes]
+        return [tried("outcome", dim, np.asanyarray, outcome) for outcome in outcomes]
     moves = zip(contexts, thetas, rngs, strict=True)
     return [tried("outcome", dim, environment.execute, c.copy(), theta.copy(), rng) for c, theta, rng in moves]
+
+
+def executed(environment: Environment, context: Array, theta: Array, rng: np.random.Generator) -> Array:
+    """The outcome ``(outcome_dim,)`` of a movement that is no movement of a learner, by `execute_many`.
+
+    Raises:
+        SimulationError: the movement has failed, in whatever way.
+    """
+    (outcome,) = execute_many(environment, [context], [theta], [rng])
+    if isinstance(outcome, Failure):
+        raise SimulationError(outcome.reason) from outcome.cause
+    return outcome
 
 
 def check_movement(environment: Environment, context: ArrayLike, theta: ArrayLike) -> tuple[Array, Array]:

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any
 
-from sgimd_torch.environments.protocol import BatchEnvironment, Environment
+from sgimd_torch.environments.protocol import Environment, moves_in_batches
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.session import Execute, live
 from sgimd_torch.spaces import Array, Failure
@@ -43,7 +43,7 @@ def executing(
         seed: number from which the random streams of the environment come.
         at_once: number of robots that move at once.
     """
-    if at_once == 1 or isinstance(environment, BatchEnvironment):
+    if at_once == 1 or moves_in_batches(environment):
         return nullcontext(live(environment, seed))
     return in_processes(make, seed, at_once)
 

@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from sgimd_torch.demonstrations.fit import beyond_limits, misfit_of
-from sgimd_torch.environments.protocol import primitive_of
+from sgimd_torch.environments.protocol import executed, primitive_of
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.runs.tasks.taught import correspondence_of
 from sgimd_torch.spaces import Array, Demonstration, read_only
@@ -62,7 +62,7 @@ def lesson_by_hand(times: Array, joints: Array, task: Task, rng: np.random.Gener
     played = times / times[-1] * longest if times[-1] > longest else times  # the last time equals longest exactly
     theta_d = robot.policies.check("theta_d", correspondence_of(task)(played, joints))
     context = robot.contexts.low + robot.contexts.sides / 2
-    demonstration = Demonstration(context, played, joints, robot.execute(context, theta_d.copy(), rng))
+    demonstration = Demonstration(context, played, joints, executed(robot, context, theta_d, rng))
     remarks = (*_differences(times, played, joints, led), *beyond_limits(robot, demonstration))
     return HandLesson(demonstration, read_only(theta_d), misfit_of(robot, theta_d, demonstration), remarks)
 

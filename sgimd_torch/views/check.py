@@ -32,7 +32,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from sgimd_torch.environments.check import check_environment
-from sgimd_torch.environments.protocol import Environment, execute_many
+from sgimd_torch.environments.protocol import Environment, beside_execute, execute_many
 from sgimd_torch.environments.sketch import traced
 from sgimd_torch.options.build import task_of
 from sgimd_torch.options.command_line import parse
@@ -88,7 +88,7 @@ def _check_picture(task: Task) -> None:
         ValueError: the outcomes differ, or the movement cannot be traced; see `traced`.
     """
     robot = task.environment
-    if getattr(robot, "trace", None) is None:
+    if not beside_execute(robot, "trace"):
         return
     context, theta = robot.observe(stream(0, "check")), robot.policies.sample(stream(1, "check"))
     outcome = robot.execute(context.copy(), theta.copy(), stream(2, "check"))
