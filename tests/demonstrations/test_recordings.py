@@ -414,11 +414,13 @@ def test_check_prints_where_recordings_land_and_names_those_that_cannot_be_used(
     assert re.search("error: 1 of 2 recordings of .*shown.npz cannot be used; the first is 1: .* in deg", printed.err)
 
     def execute(self, context, theta, rng):
-        raise SimulationError("it hit the table")
+        raise failures.pop(0)
 
     monkeypatch.setattr(PlanarArm, "execute", execute)
-    assert sgimd(*words) == 2
-    assert "cannot be used: it hit the table" in capsys.readouterr().out
+    failures = [SimulationError("it hit the table"), SystemExit(0)]
+    for reason in ("it hit the table", "SystemExit: 0"):
+        assert sgimd(*words) == 2
+        assert f"cannot be used: {reason}" in capsys.readouterr().out
 
 
 SERVANT = """
