@@ -8,6 +8,7 @@ A controller of your own needs the two members of `Controller`. ``to_gymnasium.p
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Sequence
 from copy import deepcopy
 from functools import cached_property
@@ -25,6 +26,8 @@ try:
 except ImportError as error:
     raise ImportError(f"this environment needs gymnasium: pip install 'sgimd-torch[gym]' ({error})") from error
 
+LATEST: Final = 500  # number of latest episodes whose lengths are known
+FEWEST: Final = 10  # number of episodes from which on it is told that half of them end early
 STARTS: Final = 1000  # number of different starts, where the start is the context
 
 
@@ -92,6 +95,16 @@ class FromGymnasium:
                 f"gymnasium.make(..., max_episode_steps={self.steps}), or choose fewer steps"
             )
         self._outcome, self._context = outcome, context
+        self._ended = deque[int](maxlen=LATEST)  # actions of each of the latest episodes that ended early, else 0
+
+    @property
+    def noticed(self) -> str:
+        """Sentence about episodes that end early, "" if most do not; see `Noticing`."""
+        early = [n for n in self._ended if n]
+        if 2 * len(early) < max(len(self._ended), FEWEST):
+            return ""
+        when = f"after {np.median(early):g} of {self.steps} actions (median): the later ones do nothing"
+        return f"{len(early)} of the last {len(self._ended)} episodes ended early, {when}"
 
     def observe(self, rng: np.random.Generator) -> Array:
         """``(context_dim,)``, the context of a random start of an episode; it is empty if the start counts as noise.
@@ -137,7 +150,9 @@ class FromGymnasium:
         """The context of the start with this ``seed``."""
         assert self._context is not None
         first, _ = self.world.reset(seed=seed)
-        return check_point("context", np.array(np.ma.filled(self._context(first), np.nan), dtype=np.float64), self.contexts.dim)
+        return check_point(
+            "context", np.array(np.ma.filled(self._context(first), np.nan), dtype=np.float64), self.contexts.dim
+        )
 
     @cached_property
     def _seeds(self) -> dict[bytes, int]:
@@ -158,6 +173,8 @@ class FromGymnasium:
             observations.append(deepcopy(observation))
             if terminated or truncated:
                 break
+        made = len(observations) - 1
+        self._ended.append(made if made < len(actions) else 0)
         warned = getattr(getattr(self.world.unwrapped, "data", None), "warning", None)
         if warned is not None and np.any(warned.number):
             raise SimulationError("MuJoCo gave a warning: the simulation diverged, or ran out of room", theta)

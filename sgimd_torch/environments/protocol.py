@@ -173,8 +173,8 @@ def beside_execute(environment: object, name: str) -> bool:
     Else a subclass or a wrapper has its own ``execute``, and the method would give the outcomes of its parent.
     """
     layers = [getattr(environment, "__dict__", {}), *map(vars, type(environment).__mro__)]
-    level, own = (next((k for k, layer in enumerate(layers) if member in layer), len(layers)) for member in (name, "execute"))
-    return getattr(environment, name, None) is not None and level <= own
+    nearest = next((layer for layer in layers if name in layer or "execute" in layer), {name: None})
+    return getattr(environment, name, None) is not None and name in nearest
 
 
 def moves_in_batches(environment: object) -> TypeGuard[BatchEnvironment]:
@@ -241,18 +241,6 @@ def execute_many(
         return [tried("outcome", dim, np.asanyarray, outcome) for outcome in outcomes]
     moves = zip(contexts, thetas, rngs, strict=True)
     return [tried("outcome", dim, environment.execute, c.copy(), theta.copy(), rng) for c, theta, rng in moves]
-
-
-def executed(environment: Environment, context: Array, theta: Array, rng: np.random.Generator) -> Array:
-    """The outcome ``(outcome_dim,)`` of a movement that is no movement of a learner, by `execute_many`.
-
-    Raises:
-        SimulationError: the movement has failed, in whatever way.
-    """
-    (outcome,) = execute_many(environment, [context], [theta], [rng])
-    if isinstance(outcome, Failure):
-        raise SimulationError(outcome.reason) from outcome.cause
-    return outcome
 
 
 def check_movement(environment: Environment, context: ArrayLike, theta: ArrayLike) -> tuple[Array, Array]:

@@ -52,6 +52,7 @@ class OpenRun:
 
     def __init__(self, path: str | os.PathLike[str], *, trust: bool = False) -> None:
         self.recorded = read_run(path)
+        say(*(f"{path}: {remark}" for remark in self.recorded.remarks))
         self.parts = build_again(config_of(self.recorded, trust=trust))
         now = sources(self.parts.config, self.parts.environment)
         if changes := changed_versions(self.recorded.versions, now):

@@ -41,6 +41,7 @@ class Run:
         summary: numbers of "movements" and of "failed" movements, whether the run is "finished", seconds by part, and
             "expected", the mean error that the learner expected when ``--until`` ended the run, or None.
         changes: descriptions of the changes of the robot that the learner noticed.
+        remarks: sentences on what the latest outcomes tell of the robot, see `remarks_on`.
         index: ``(n,)`` numbers of the movements, from 0.
         origin: ``(n,)`` origin of each movement, such as "local" or "imitate"; "" for a rest.
         demonstration: ``(n,)`` indices in ``demonstrations`` of what was shown just before each movement; -1: nothing.
@@ -83,6 +84,7 @@ class Run:
     requests: Columns | None = None
     failed: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, np.bool_))
     tolerance: float = float("nan")
+    remarks: list[str] = field(default_factory=list)
 
     @property
     def evaluation(self) -> dict[str, Array]:
@@ -162,6 +164,7 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         files=about["files"],
         robot=about["robot"],
         words=about["words"],
+        remarks=[*about.get("remarks", {}).values()],
         tolerance=about.get("tolerance", float("nan")),
         spaces={name: Box(*box) for name, box in about["spaces"].items()},
         summary={

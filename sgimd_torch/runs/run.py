@@ -28,6 +28,7 @@ from sgimd_torch.session import NoOutcomeError, run
 from sgimd_torch.spaces import Episode
 
 N_TOLD: Final = 3  # number of failures with a message each; later ones are only counted
+REMARK_EVERY: Final = 50  # number of movements between two looks at the outcomes
 COMMIT_EVERY: Final = 1.0  # s between two commits; a killed run loses the movements since the last commit
 
 
@@ -101,6 +102,7 @@ class RunLoop:
             self.listeners.append(board)
         self._wanted = parts.config.evaluations  # numbers of movements before the evaluations to come
         self._committed_at = time.monotonic()
+        self._told = {*self.record.about.setdefault("remarks", {})}  # kinds of remarks that were told
 
     def __enter__(self) -> Self:
         return self
@@ -234,8 +236,20 @@ class RunLoop:
             self._evaluate()
         if self.movements == self.recorded:
             self._begin()
+        if not replayed and self.movements % REMARK_EVERY == 0:
+            self._remark()
         if not self.replaying and time.monotonic() - self._committed_at >= COMMIT_EVERY:
             self.commit()
+
+    def _remark(self) -> None:
+        """Say what outcomes tell of the robot, each kind once; the record keeps it for tables, reports and answers."""
+        from sgimd_torch.environments.remarks import remarks_on  # a short run looks at nothing
+
+        learner = self.parts.learner
+        found = remarks_on(self.parts.environment, learner.memory.outcomes[learner.begun :])
+        self.record.about["remarks"] = found
+        say(*(text for kind, text in found.items() if kind not in self._told))
+        self._told |= found.keys()
 
     def _ends_early(self) -> bool:
         """Whether --until ends the run now; then there is a last evaluation."""

@@ -27,13 +27,13 @@ from typing import Final
 import numpy as np
 
 from sgimd_torch.environments.motor_primitives import GaussianPrimitive
-from sgimd_torch.environments.protocol import SimulationError, executed, primitive_of
+from sgimd_torch.environments.protocol import execute_many, primitive_of
 from sgimd_torch.files import check_writable, write_text
 from sgimd_torch.options.build import RunParts
 from sgimd_torch.options.signature import parsed
 from sgimd_torch.runs.load import OpenRun
 from sgimd_torch.runs.signals import Failed, parser_of
-from sgimd_torch.spaces import Array, Box, stream
+from sgimd_torch.spaces import Array, Box, Failure, stream
 
 Answer = dict[str, Array]
 """Vectors of an answer, by the names "goal", "context", "theta", "expected" and "reached", and ``DISTANCES``, of one
@@ -91,9 +91,7 @@ def parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _answers(
-    parts: RunParts, goals: Sequence[Sequence[float]], given: Sequence[float] | None
-) -> Iterator[Answer]:
+def _answers(parts: RunParts, goals: Sequence[Sequence[float]], given: Sequence[float] | None) -> Iterator[Answer]:
     robot, inverse = parts.environment, parts.learner.inverse
     middle = (robot.contexts.low + robot.contexts.high) / 2
     context = robot.contexts.check("--context", middle if given is None else given)
@@ -118,11 +116,11 @@ def _execute(parts: RunParts, answers: Sequence[Answer]) -> Iterator[str]:
     """Add to each answer what the robot reaches with it; yields a reason for each movement that fails."""
     robot = parts.environment
     for k, answer in enumerate(answers):
-        try:
-            reached = executed(robot, answer["context"], answer["theta"], stream(parts.config.seed, "ask", k))
-        except SimulationError as error:
+        rng = stream(parts.config.seed, "ask", k)
+        (reached,) = execute_many(robot, [answer["context"]], [answer["theta"]], [rng])
+        if isinstance(reached, Failure):
+            yield f"goal {_text(answer['goal'])}: {reached.reason}"
             reached = np.full(robot.outcomes.dim, np.nan)
-            yield f"goal {_text(answer['goal'])}: {error}"
         answer |= {"reached": reached, "error": np.array([math.dist(reached, answer["goal"])])}
 
 

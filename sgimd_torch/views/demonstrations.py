@@ -39,7 +39,14 @@ from sgimd_torch.demonstrations.columns import ColumnNames, Recording
 from sgimd_torch.demonstrations.fit import beyond_limits, misfit_of
 from sgimd_torch.demonstrations.text import read_text
 from sgimd_torch.demonstrations.units import in_units, paced
-from sgimd_torch.environments.protocol import Replaying, SimulationError, beside_execute, executed, primitive_of, tried
+from sgimd_torch.environments.protocol import (
+    Replaying,
+    SimulationError,
+    beside_execute,
+    execute_many,
+    primitive_of,
+    tried,
+)
 from sgimd_torch.files import check_regular
 from sgimd_torch.options.build import task_of
 from sgimd_torch.options.command_line import parse
@@ -253,14 +260,17 @@ def check(task: Task, demonstration: Demonstration, row: int) -> Checked:
             )
         context = robot.contexts.check("its context", demonstration.context)
         theta = theta_of(task, demonstration)
-        lands = executed(robot, context, theta, stream(row, "demonstrations check"))
+        (lands,) = execute_many(robot, [context], [theta], [stream(row, "demonstrations check")])
+        if isinstance(lands, Failure):
+            raise SimulationError(lands.reason)
         if not demonstration.outcome.size:
-            outcome: Array | Failure = lands
+            outcome = lands
             # A replay has no context.
             if isinstance(robot, Replaying) and beside_execute(robot, "replay") and not context.size:
-                outcome = tried("outcome", len(lands), robot.replay, demonstration.times, demonstration.trajectory)
-                if isinstance(outcome, Failure):
-                    raise SimulationError(f"its replay failed: {outcome.reason}")
+                replayed = tried("outcome", len(lands), robot.replay, demonstration.times, demonstration.trajectory)
+                if isinstance(replayed, Failure):
+                    raise SimulationError(f"its replay failed: {replayed.reason}")
+                outcome = replayed
             demonstration = replace(demonstration, outcome=outcome)
             remarks = beyond_limits(robot, demonstration)
     except (ValueError, SimulationError) as error:

@@ -86,6 +86,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     for variant in variants:
         if others := [option for option in differing([variant]) if option not in MAY_CHANGE]:
             say(f"{variant.name}: its seeds differ in {', '.join(others)}; were two studies given one --name?")
+    say(*(f"{run.path}: {remark}" for run in runs for remark in run.remarks))
     say(*(f"left out: {reason}" for reason in left_out))
     return 0
 

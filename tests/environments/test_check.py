@@ -150,7 +150,9 @@ class Warm(Cannon):
 
 
 def test_an_execute_many_that_does_not_count_is_remarked():
-    (remark,) = check_environment(type("Own", (Cannon,), {"execute": lambda self, *given: Cannon.execute(self, *given)})())
+    (remark,) = check_environment(
+        type("Own", (Cannon,), {"execute": lambda self, *given: Cannon.execute(self, *given)})()
+    )
     assert remark.startswith("execute_many() is a parent's, execute() is not: movements are made one by one")
 
 
@@ -229,7 +231,7 @@ def test_the_command_says_what_it_found(capsys):
 def test_a_task_space_much_larger_than_random_movements_reach_is_told(arms, capsys):
     assert command(_call, ["check", "my_arms:Wide"]) == 0
     said = capsys.readouterr().out
-    assert re.search(r"20 random movements span only 0\.\d+ % of T, \[.*\] x \[.*\]; .* make T smaller", said)
+    assert re.search(r"the last 20 outcomes span only 0\.\d+ % of T, \[.*\] x \[.*\]; .* make T smaller", said)
 
 
 @pytest.mark.parametrize(

@@ -61,7 +61,7 @@ def test_a_view_that_builds_the_robot_again_says_that_its_file_has_changed(own, 
     with (own / "sliders.py").open("a") as file:
         file.write("\n# another remark\n")
     assert command(view.main, words) == 0
-    said = r"the robot of runs/random/seed-000 is not what it was, and moves as it is now: source of sliders:Slider .* ->"
+    said = r"of runs/random/seed-000 is not what it was, and moves as it is now: source of sliders:Slider .* ->"
     assert re.search(said, capsys.readouterr().err)
 
 

@@ -37,7 +37,7 @@ def warnings(variants: Sequence[Variant]) -> Iterator[str]:
     if len(lasts) > 1:
         yield f"The last errors belong to different numbers of movements: {', '.join(map(str, lasts))}."
     for run in every:
-        yield from (f"{run.path}: {change}." for change in run.changes)
+        yield from (f"{run.path}: {remark}.".replace("?.", "?") for remark in (*run.changes, *run.remarks))
     cut = [run for run in every if not run.summary["finished"]]
     if cut:
         named = [f"{run.path}: {len(run.index)} of {run.config['movements']} movements" for run in cut]
