@@ -167,6 +167,9 @@ class Box:
                 f"Box needs finite corners, but dimension {k} is [{low[k]}, {high[k]}]{more}; is it a space without "
                 "bounds, for example of actions? Choose bounds for it"
             )
+        if len(equal := np.flatnonzero(low == high)):
+            k = equal[0]
+            raise ValueError(f"Box needs low < high, but dimension {k} is {low[k]} in both: it cannot vary; leave it out")
         if not (low < high).all():
             raise ValueError(f"Box needs corners with low < high, got {low} and {high}; were they swapped?")
         given: Any = self.names

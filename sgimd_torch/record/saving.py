@@ -30,7 +30,7 @@ def save_life(learner: Learner, path: str | os.PathLike[str]) -> None:
             f"the memory has {len(learner.memory)} exemplars, but {lived} were lived; were some added without "
             "learner.add(), which records them?"
         )
-    about = {"begun": learner.begun}
+    about = {"begun": learner.begun, "seed": learner.seed}
     with replacing(path) as partial, Record.make(partial, learner.problem.dims, about) as record:
         for event in learner.events():
             record.add(event)
@@ -74,5 +74,7 @@ def repeated(learner: Learner, path: str | os.PathLike[str], *, teacher: Teacher
         begun = record.about.get("begun", 0)
         if begun != learner.begun:
             raise ReplayError(f"{path} began with {begun} exemplars in memory, this learner began with {learner.begun}")
+        if (seed := record.about.get("seed", learner.seed)) != learner.seed:
+            raise ReplayError(f"{path} is the life of a learner with seed {seed}, this learner has seed {learner.seed}")
         exact = repeats_exactly(record.about, learner)
         yield from replay(learner, record.events(), teacher=teacher, exact=exact)

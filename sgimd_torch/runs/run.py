@@ -61,6 +61,8 @@ def run_one(parts: RunParts, stopping: Stopping, *, resume: bool, again: str) ->
             if not isinstance(raised, SimulationError):
                 say("".join(traceback.format_exception(raised)).rstrip())
             said = str(error) if raised is not error else reason_of(error)
+            if isinstance(error, NoOutcomeError):
+                said += " (--failures says how many in a row end a run)"
             raise Failed(f"{said}; {loop.movements} movements are kept; to go on: {again}") from error
         return loop.summary
 
