@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 
+from sgimd_torch import __version__
 from sgimd_torch.files import replacing
 from sgimd_torch.learner import Learner
 from sgimd_torch.learner.events import Kind
@@ -30,7 +31,7 @@ def save_life(learner: Learner, path: str | os.PathLike[str]) -> None:
             f"the memory has {len(learner.memory)} exemplars, but {lived} were lived; were some added without "
             "learner.add(), which records them?"
         )
-    about = {"begun": learner.begun, "seed": learner.seed}
+    about = {"begun": learner.begun, "seed": learner.seed, "versions": {"sgimd_torch": __version__}}
     with replacing(path) as partial, Record.make(partial, learner.problem.dims, about) as record:
         for event in learner.events():
             record.add(event)
