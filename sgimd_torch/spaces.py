@@ -128,6 +128,20 @@ def first_entry(array: Array, wrong: NDArray[np.bool_]) -> str:
     return f"entry {entries[0].tolist()} is {array[tuple(entries[0])]}{more}"
 
 
+def first_fall(times: Array) -> tuple[int, str] | None:
+    """Number of the first of ``times`` ``(n_times,)`` (s) that is not above the one before, and why; None: all are."""
+    falls = np.flatnonzero(np.diff(times) <= 0)
+    if not len(falls):
+        return None
+    k = int(falls[0]) + 1
+    if times[k] < times[k - 1]:
+        return k, f"is at {times[k]:.12g} s, after {times[k - 1]:.12g} s; were rows shuffled?"
+    same = f"is at {times[k]:.12g} s, as the one before"
+    if len(falls) <= max(1, len(times) / 4):
+        return k, f"{same}; was it written twice?"
+    return k, f"{same}, and so are {len(falls) - 1} more; are times epochs in float32, or whole seconds?"
+
+
 def _in_short(value: object) -> str:
     return " ".join(reprlib.repr(value).split())
 
@@ -169,7 +183,9 @@ class Box:
             )
         if len(equal := np.flatnonzero(low == high)):
             k = equal[0]
-            raise ValueError(f"Box needs low < high, but dimension {k} is {low[k]} in both: it cannot vary; leave it out")
+            raise ValueError(
+                f"Box needs low < high, but dimension {k} is {low[k]} in both: it cannot vary; leave it out"
+            )
         if not (low < high).all():
             raise ValueError(f"Box needs corners with low < high, got {low} and {high}; were they swapped?")
         given: Any = self.names
@@ -330,8 +346,8 @@ class Demonstration:
         for name in ("context", "times", "trajectory", "outcome"):
             value = np.atleast_1d(getattr(self, name))
             check_vector(f"{name} of a demonstration", value, value.shape[-1], "did the recording drop samples?")
-        if (np.diff(self.times) <= 0).any():
-            raise ValueError("times of a demonstration must increase; were its rows shuffled?")
+        if fall := first_fall(self.times):
+            raise ValueError(f"times of a demonstration must increase, but sample {fall[0]} {fall[1]}")
         _own(self, "context", "times", "trajectory", "outcome")
 
 

@@ -426,9 +426,8 @@ class MujocoRobot:
             nearer = nearer or "put the object nearer to the robot"
             advice = f"give low and high, which are the corners of T, or {nearer}" if len(moved) else nearer
             advice = "write a shorter timestep into the model" if lost == EXPLORED else advice
-            raise ValueError(
-                f"{len(moved)} of {EXPLORED} random movements of {file} move {', '.join(names)}, {lost} diverge; {advice}"
-            )
+            what = f"{len(moved)} of {EXPLORED} random movements of {file} move {', '.join(names)}"
+            raise ValueError(f"{what}, {lost} diverge; {advice}")
         low, high = np.quantile(moved, (0.05, 0.95), axis=0)  # an object that flies away does not set the size of T
         low, high = np.minimum(low, rest) - 0.1 * (high - low), np.maximum(high, rest) + 0.1 * (high - low)
         flat = [name for name, side in zip(names, high - low, strict=True) if side < MOVED]

@@ -16,7 +16,7 @@ from typing import Any, Final, Protocol, TypeGuard, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.spaces import Array, Box, Failure, check_point, check_vector, first_entry, read_only
+from sgimd_torch.spaces import Array, Box, Failure, check_point, check_vector, first_fall, read_only
 
 MEMBERS: Final = ("contexts", "policies", "outcomes", "rest", "outcome_noise", "observe", "execute")
 
@@ -271,11 +271,8 @@ def check_recording(
     times = check_point(
         "times", check_vector("times", times, len(trajectory), "one in s for each row"), len(trajectory)
     )
-    falls = np.diff(times, prepend=-np.inf) <= 0
-    if falls.any():
-        raise ValueError(
-            f"times must increase from sample to sample, but {first_entry(times, falls)}; were rows shuffled?"
-        )
+    if fall := first_fall(times):
+        raise ValueError(f"times must increase, but sample {fall[0]} {fall[1]}")
     lasts = times[-1] - times[0]
     if lasts > longest * (1 + 1e-9):
         raise ValueError(

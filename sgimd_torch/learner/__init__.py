@@ -325,7 +325,9 @@ class Learner:
         if not self._asked:
             self.ask_many([Failure(reason)])
         if (n := len(self._asked)) > 1:
-            raise RuntimeError(f"fail() is of one robot, but {n} were asked; write tell_many([outcome, Failure(reason)])")
+            raise RuntimeError(
+                f"fail() is of one robot, but {n} were asked; write tell_many([outcome, Failure(reason)])"
+            )
         self.tell_many([Failure(reason)])
 
     def interrupt(self) -> None:

@@ -19,7 +19,8 @@ from sgimd_torch.evaluation import OwnGoals
 from sgimd_torch.files import checksum
 from sgimd_torch.learner.events import Kind
 from sgimd_torch.options.config import FILES, OWN, Config, differ
-from sgimd_torch.record import DERIVED, Record, RunError, layout
+from sgimd_torch.record import DERIVED, Record, RunError
+from sgimd_torch.record.layout import layout
 from sgimd_torch.runs.directory import NOT_COMPARED, RUN_FILE, code_of, with_found_earlier
 from sgimd_torch.spaces import Array, Box, Demonstration
 
@@ -248,7 +249,9 @@ def config_of(run: Run, *, trust: bool = False) -> Config:
         return Config.from_settings(run.config)
     except (TypeError, ValueError) as error:
         wrote = f"sgimd_torch {run.versions.get('sgimd_torch')} wrote them"
-        raise RunError(f"the settings of {run.path} do not describe a run of this version ({wrote}): {error}") from error
+        raise RunError(
+            f"the settings of {run.path} do not describe a run of this version ({wrote}): {error}"
+        ) from error
 
 
 def find_runs(place: str | os.PathLike[str]) -> dict[str, list[Path]]:
