@@ -181,13 +181,10 @@ class Box:
                 f"Box needs finite corners, but dimension {k} is [{low[k]}, {high[k]}]{more}; is it a space without "
                 "bounds, for example of actions? Choose bounds for it"
             )
-        if len(equal := np.flatnonzero(low == high)):
-            k = equal[0]
-            raise ValueError(
-                f"Box needs low < high, but dimension {k} is {low[k]} in both: it cannot vary; leave it out"
-            )
         if not (low < high).all():
-            raise ValueError(f"Box needs corners with low < high, got {low} and {high}; were they swapped?")
+            still = np.flatnonzero(low == high)
+            hint = f"dimension {still[0]} cannot vary, so leave it out" if len(still) else "were they swapped?"
+            raise ValueError(f"Box needs corners with low < high, got {low} and {high}; {hint}")
         given: Any = self.names
         names = tuple(given)
         texts = all(isinstance(text, str) and text.isprintable() for text in (*names, self.unit))

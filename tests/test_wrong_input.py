@@ -102,7 +102,7 @@ CALLS = {
     "corners swapped": (lambda: Box(np.ones(2), np.zeros(2)), "corners with low < high, .* were they swapped?"),
     "a parameter that cannot vary": (
         lambda: Box(np.zeros(3), np.array([1.0, 0.0, 1.0])),
-        "dimension 1 is 0.0 in both: it cannot vary; leave it out",
+        "corners with low < high, .* dimension 1 cannot vary, so leave it out",
     ),
     "a text for names": (lambda: Box(np.zeros(2), np.ones(2), names="xy"), "Box needs 2 names"),
     "an escape code in a name": (lambda: Box.cube(0, 1, 1, names=("x\x1b[31m",)), "without control characters"),

@@ -132,13 +132,9 @@ def _times(table: Table, names: ColumnNames, rows: slice) -> Array:
 
 def _moments(table: Table, column: str, rows: slice) -> list[float]:
     """Times of a column of dates, or of ISO texts, as s after the first; [] for a column of numbers."""
-    values = table.columns.get(column, np.empty(0))[rows].tolist()
-    if (
-        not values
-        or not isinstance(values[0], str | datetime)
-        or NUMBER.fullmatch(str(values[0]))
-        or values[0] == column
-    ):
+    values = table.columns.get(column, np.empty(0))[rows].tolist()  # empty: the entry of a vector
+    first = next(iter(values), 0.0)
+    if not isinstance(first, str | datetime) or NUMBER.fullmatch(str(first)) or first == column:
         return []
     moments = list[datetime]()
     for row, value in enumerate(values, rows.start):

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 
 from sgimd_torch.environments.controllers import Controller
 from sgimd_torch.environments.protocol import Primitive, SimulationError, check_movement, check_recording, check_robot
+from sgimd_torch.environments.remarks import FEWEST, LATEST
 from sgimd_torch.spaces import Array, Box, check_count, check_point, check_rng, stream
 
 try:
@@ -26,8 +27,6 @@ try:
 except ImportError as error:
     raise ImportError(f"this environment needs gymnasium: pip install 'sgimd-torch[gym]' ({error})") from error
 
-LATEST: Final = 500  # number of latest episodes whose lengths are known
-FEWEST: Final = 10  # number of episodes from which on it is told that half of them end early
 STARTS: Final = 1000  # number of different starts, where the start is the context
 
 
@@ -150,9 +149,8 @@ class FromGymnasium:
         """The context of the start with this ``seed``."""
         assert self._context is not None
         first, _ = self.world.reset(seed=seed)
-        return check_point(
-            "context", np.array(np.ma.filled(self._context(first), np.nan), dtype=np.float64), self.contexts.dim
-        )
+        context = np.array(np.ma.filled(self._context(first), np.nan), dtype=np.float64)
+        return check_point("context", context, self.contexts.dim)
 
     @cached_property
     def _seeds(self) -> dict[bytes, int]:

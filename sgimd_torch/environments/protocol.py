@@ -66,11 +66,7 @@ class Environment(Protocol):
 
 @runtime_checkable
 class BatchEnvironment(Environment, Protocol):
-    """An environment that executes many movements faster together than one by one.
-
-    The method counts if it is defined beside ``execute`` or below: a subclass with an ``execute`` of its own moves one
-    by one, unless it has its own ``execute_many``, too.
-    """
+    """An environment that executes many movements faster together than one by one; see `moves_in_batches`."""
 
     def execute_many(self, contexts: Array, thetas: Array, rngs: Sequence[np.random.Generator]) -> Array:
         """``(n, outcome_dim)``, row i equal to ``execute(contexts[i], thetas[i], rngs[i])`` bit for bit.

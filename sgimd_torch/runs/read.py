@@ -248,10 +248,8 @@ def config_of(run: Run, *, trust: bool = False) -> Config:
     try:
         return Config.from_settings(run.config)
     except (TypeError, ValueError) as error:
-        wrote = f"sgimd_torch {run.versions.get('sgimd_torch')} wrote them"
-        raise RunError(
-            f"the settings of {run.path} do not describe a run of this version ({wrote}): {error}"
-        ) from error
+        told = f"the settings of {run.path}, by sgimd_torch {run.versions.get('sgimd_torch')},"
+        raise RunError(f"{told} do not describe a run of this version: {error}") from error
 
 
 def find_runs(place: str | os.PathLike[str]) -> dict[str, list[Path]]:

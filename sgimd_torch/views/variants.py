@@ -51,15 +51,12 @@ def read_runs(place: Path) -> dict[str, list[Run]]:
 
 def best_first(variants: Iterable[Variant]) -> list[Variant]:
     """Variants in the order of their last errors in each unit, the smallest first; those without an error come last."""
-
-    def place(variant: Variant) -> tuple[bool, str, float, str]:
-        error = variant.last_error
-        return error is None, variant.space.unit if error else "", error.value if error else np.inf, variant.name
-
-    return sorted(variants, key=place)
+    return sorted(
+        variants, key=lambda v: (not v.last_error, v.space.unit, v.last_error.value if v.last_error else 0.0, v.name)
+    )
 
 
-def units_differ(variants: Sequence[Variant]) -> list[str]:
+def unalike(variants: Sequence[Variant]) -> list[str]:
     """A sentence if the errors of variants have different units."""
     names: dict[str, list[str]] = {}
     for variant in variants:

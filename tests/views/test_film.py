@@ -308,8 +308,8 @@ for path in sys.argv[1:]:
     around = ~arm & (np.hypot(*np.gradient(frame)) < 1)  # no lines and no edges
     print(arm.sum(), np.median(frame[arm]) - np.median(frame[around]))
 """
-ARM_OF_GREY = """<mujoco><worldbody>{}<body><joint name='turn' axis='0 0 1' range='-120 120'/><geom name='arm' type='capsule'
-  fromto='0 0 0 .3 0 0' size='.03' rgba='{} {} {} 1'/><site name='tip' pos='.3 0 0'/></body></worldbody>
+ARM_OF_GREY = """<mujoco><worldbody>{}<body><joint name='turn' axis='0 0 1' range='-120 120'/><geom name='arm'
+  type='capsule' fromto='0 0 0 .3 0 0' size='.03' rgba='{} {} {} 1'/><site name='tip' pos='.3 0 0'/></body></worldbody>
   <actuator><position joint='turn' kp='20' kv='4'/></actuator></mujoco>"""
 
 
