@@ -489,6 +489,10 @@ class Replays(Servant):
     def replay(self, times, trajectory):
         return trajectory[-1] + times[-1]
 
+class Halves(Replays):
+    def execute(self, context, theta, rng):
+        return super().execute(context, theta, rng) / 2
+
 class Slow(PlanarArm):
     primitive = GaussianPrimitive(Box.cube(-1, 1, 2), (0.8, 1.6))
     correspondence = staticmethod(primitive.correspondence)
@@ -537,6 +541,8 @@ def test_shares_of_ranges_become_angles_of_the_robot_and_its_movement_gives_the_
     assert "1 of 1 can be used; they land 0.000 (median)" in capsys.readouterr().out
     (shown,) = of_servant(tmp_path, module, [SHARES], *words, robot="Replays")
     np.testing.assert_allclose(shown.outcome, [0.4, 4.2])  # of the replay, which lasts 1 s
+    (shown,) = of_servant(tmp_path, module, [SHARES], *words, robot="Halves")
+    np.testing.assert_allclose(shown.outcome, [-0.3, 1.6], atol=0.05)  # the replay is that of another robot
     assert of_servant(tmp_path, module, [SHARES], "--joints", "turn", "--unit=-100:100") is None
     assert "the robot has 2 joints, the recordings have 1: turn" in capsys.readouterr().err
 

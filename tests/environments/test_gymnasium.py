@@ -94,6 +94,12 @@ def test_a_movement_is_an_episode_of_the_controllers_commands():
     np.testing.assert_allclose(robot.world.actions, [[1.0, 0.0]] * 20, atol=1e-7)
 
 
+def test_what_a_mask_hides_is_no_outcome():
+    robot = sled(outcome=lambda observations: np.ma.masked_array([0.1, 0.2], [False, True]))
+    with pytest.raises(SimulationError, match="the outcome is not finite"):
+        robot.execute(NO_CONTEXT, np.full(9, 0.5), stream(0, "any"))
+
+
 def test_a_world_that_ends_most_episodes_early_is_told_and_one_that_seldom_does_is_not():
     away = np.array([1.0] * 8 + [0.5])  # as fast as it can
     robots = {ends_at: sled(world=Sled(ends_at=ends_at, noise=0.0)) for ends_at in (0.1, 9.0)}
