@@ -18,7 +18,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sgimd_torch.environments.protocol import BatchEnvironment, Environment, execute_many, observed, tried
+from sgimd_torch.environments.protocol import Environment, execute_many, moves_in_batches, observed, tried
 from sgimd_torch.files import read_npz, write_npz
 from sgimd_torch.parts import Inverse
 from sgimd_torch.spaces import Array, Box, Estimate, Failure, check_count, check_vector, first_entry, stream
@@ -208,7 +208,7 @@ def evaluate(
 
     def look(row: int) -> bool:
         """Answer anew if the context of a movement has changed; False: the robot cannot see it."""
-        if context is not None or not environment.contexts.dim or isinstance(environment, BatchEnvironment):
+        if context is not None or not environment.contexts.dim or moves_in_batches(environment):
             return True
         seen = tried("context", environment.contexts.dim, _context_of_goal, environment, row % n)
         if isinstance(seen, Failure):
@@ -254,7 +254,7 @@ def _landed(
     Before a movement, ``look`` may change its context and theta, or say that there is none.
     """
     landed = np.full((len(thetas), environment.outcomes.dim), np.nan)
-    together = TOGETHER if isinstance(environment, BatchEnvironment) else 1
+    together = TOGETHER if moves_in_batches(environment) else 1
     waiting = [order[start : start + together].tolist() for start in range(0, len(order), together)][::-1]
     while waiting:
         between()

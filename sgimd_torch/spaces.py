@@ -68,14 +68,16 @@ def check_vector(name: str, value: ArrayLike, dim: int, hint: str = "") -> Array
         if with_itself < 1e199:
             return value
     hint = f"; {hint}" if hint else ""
+    wanted = f"{name} must be real numbers of shape (..., {dim})"
+    parts = value if isinstance(value, list | tuple) else (value,)
+    if any(isinstance(part, np.ma.MaskedArray) for part in parts):  # numpy would take what it hides
+        raise ValueError(f"{wanted}, got a masked array {_in_short(value)}{hint}")
     try:
         array = np.asarray(value)
     except (TypeError, ValueError) as error:
-        raise ValueError(f"{name} must be real numbers of shape (..., {dim}), got {_in_short(value)}{hint}") from error
-    masked = isinstance(value, np.ma.MaskedArray)
-    if masked or array.dtype.kind not in "fiu":
-        kind = "a masked array" if masked else array.dtype
-        raise ValueError(f"{name} must be real numbers of shape (..., {dim}), got {kind} {_in_short(value)}{hint}")
+        raise ValueError(f"{wanted}, got {_in_short(value)}{hint}") from error
+    if array.dtype.kind not in "fiu":
+        raise ValueError(f"{wanted}, got {array.dtype} {_in_short(value)}{hint}")
     if array.ndim == 0 or array.shape[-1] != dim:
         raise ValueError(f"{name} must have shape (..., {dim}), got {array.shape}{hint}")
     array = array.astype(np.float64, copy=False)
@@ -127,6 +129,20 @@ def first_entry(array: Array, wrong: NDArray[np.bool_]) -> str:
     return f"entry {entries[0].tolist()} is {array[tuple(entries[0])]}{more}"
 
 
+def first_fall(times: Array) -> tuple[int, str] | None:
+    """Number of the first of ``times`` ``(n_times,)`` (s) that is not above the one before, and why; None: all are."""
+    falls = np.flatnonzero(np.diff(times) <= 0)
+    if not len(falls):
+        return None
+    k = int(falls[0]) + 1
+    if times[k] < times[k - 1]:
+        return k, f"is at {times[k]:.12g} s, after {times[k - 1]:.12g} s; were rows shuffled?"
+    same = f"is at {times[k]:.12g} s, as the one before"
+    if len(falls) <= max(1, len(times) / 4):
+        return k, f"{same}; was it written twice?"
+    return k, f"{same}, and so are {len(falls) - 1} more; are times epochs in float32, or whole seconds?"
+
+
 def _in_short(value: object) -> str:
     return " ".join(reprlib.repr(value).split())
 
@@ -167,7 +183,9 @@ class Box:
                 "bounds, for example of actions? Choose bounds for it"
             )
         if not (low < high).all():
-            raise ValueError(f"Box needs corners with low < high, got {low} and {high}; were they swapped?")
+            still = np.flatnonzero(low == high)
+            hint = f"dimension {still[0]} cannot vary, so leave it out" if len(still) else "were they swapped?"
+            raise ValueError(f"Box needs corners with low < high, got {low} and {high}; {hint}")
         given: Any = self.names
         names = tuple(given)
         texts = all(isinstance(text, str) and text.isprintable() for text in (*names, self.unit))
@@ -326,8 +344,8 @@ class Demonstration:
         for name in ("context", "times", "trajectory", "outcome"):
             value = np.atleast_1d(getattr(self, name))
             check_vector(f"{name} of a demonstration", value, value.shape[-1], "did the recording drop samples?")
-        if (np.diff(self.times) <= 0).any():
-            raise ValueError("times of a demonstration must increase; were its rows shuffled?")
+        if fall := first_fall(self.times):
+            raise ValueError(f"times of a demonstration must increase, but sample {fall[0]} {fall[1]}")
         _own(self, "context", "times", "trajectory", "outcome")
 
 

@@ -59,6 +59,8 @@ def test_anything_but_a_count_is_refused(value: object):
         (THETA > 0, "bool"),
         ([True] * 25, "bool"),
         (np.ma.masked_array(THETA, THETA > 0), "masked"),
+        ([np.ma.masked_array(THETA, THETA > 0)], "masked"),
+        ([np.ma.masked] * 25, "masked"),
     ],
 )
 def test_a_vector_of_anything_but_real_numbers_is_refused_by_its_type(value: object, found: str):

@@ -100,6 +100,10 @@ CALLS = {
     "a pupil that cannot learn": (lambda: learner().watch(SHOWN), "has no social strategy"),
     "no correspondence": (lambda: sgim_d(ARM, 0), "missing 1 required keyword-only argument: 'correspondence'"),
     "corners swapped": (lambda: Box(np.ones(2), np.zeros(2)), "corners with low < high, .* were they swapped?"),
+    "a parameter that cannot vary": (
+        lambda: Box(np.zeros(3), np.array([1.0, 0.0, 1.0])),
+        "corners with low < high, .* dimension 1 cannot vary, so leave it out",
+    ),
     "a text for names": (lambda: Box(np.zeros(2), np.ones(2), names="xy"), "Box needs 2 names"),
     "an escape code in a name": (lambda: Box.cube(0, 1, 1, names=("x\x1b[31m",)), "without control characters"),
     "a seed for a teacher": (lambda: PeriodicTeacher([SHOWN], 0), "rng must be a numpy.random.Generator, got int"),

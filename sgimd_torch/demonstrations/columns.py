@@ -12,12 +12,13 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from itertools import groupby
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from sgimd_torch.spaces import Array, Demonstration
+from sgimd_torch.spaces import Array, Demonstration, first_fall
 
 NUMBER: Final = re.compile(r"[+-]?(\d+(\.\d*|,\d+)?|[.,]\d+)([eE][+-]?\d+)?", re.ASCII)
 _NAME: Final = re.compile(r"(?P<column>[^\[\]]+)(\[(?P<first>\d+)(?P<slice>:(?P<end>\d+)?)?\])?", re.ASCII)
@@ -31,7 +32,7 @@ class ColumnNames:
         joints: columns of joint angles or of motor commands, in the order of the robot's correspondence.
         outcome: columns of the outcome, read in the last row of a recording; () if the table has no outcome.
         context: columns of the context, read in the first row of a recording; () for a robot without contexts.
-        time: column of the time (s); the first time of a recording counts as 0.
+        time: column of the time, in s or in ISO 8601; the first time of a recording counts as 0.
         recording: column with the number or name of the recording of each row; None: a table is one recording.
         rate: samples per second of a table without times; None if ``time`` has the times.
         header: names of all columns of a text without names; () if its first row has the names.
@@ -104,7 +105,8 @@ def recordings_of(table: Table, names: ColumnNames) -> list[Recording]:
     for title, rows in _groups(table, names.recording):
         try:
             joints, joint_names = _values(table, names.joints, rows)
-            outcomes, contexts = (_values(table, columns, rows)[0] for columns in (names.outcome, names.context))
+            outcomes, _ = _values(table, names.outcome, slice(rows.stop - 1, rows.stop))
+            contexts, _ = _values(table, names.context, slice(rows.start, rows.start + 1))
             if len(joints) < 2:
                 raise ValueError(f"it has 1 sample, but needs 2 or more; does {names.recording} number the rows?")
             demonstration = Demonstration(contexts[0], _times(table, names, rows), joints, outcomes[-1])
@@ -118,14 +120,32 @@ def _times(table: Table, names: ColumnNames, rows: slice) -> Array:
     """``(n_samples,)`` s, from 0."""
     if names.rate is not None:
         return np.arange(rows.stop - rows.start) / names.rate
-    times, _ = _values(table, (names.time,), rows)
+    moments = _moments(table, names.time, rows)
+    times = np.array(moments)[:, None] if moments else _values(table, (names.time,), rows)[0]
     if times.shape[1] != 1:
         raise ValueError(f"{names.time} must be one number for each row, got {times.shape[1]}")
-    falls = np.flatnonzero(np.diff(times[:, 0]) <= 0)
-    if len(falls):
-        row = table.rows[rows.start + falls[0] + 1]
-        raise ValueError(f"row {row}: {names.time} must increase from row to row; were rows shuffled?")
+    if fall := first_fall(times[:, 0]):
+        row = table.rows[rows.start + fall[0]]
+        raise ValueError(f"row {row}: {names.time} must increase from row to row, but this row {fall[1]}")
     return times[:, 0] - times[0, 0]
+
+
+def _moments(table: Table, column: str, rows: slice) -> list[float]:
+    """Times of a column of dates, or of ISO texts, as s after the first; [] for a column of numbers."""
+    values = table.columns.get(column, np.empty(0))[rows].tolist()  # empty: the entry of a vector
+    first = next(iter(values), 0.0)
+    if not isinstance(first, str | datetime) or NUMBER.fullmatch(str(first)) or first == column:
+        return []
+    moments = list[datetime]()
+    for row, value in enumerate(values, rows.start):
+        try:
+            moments.append(value if isinstance(value, datetime) else datetime.fromisoformat(value))
+        except ValueError as error:
+            wanted = "neither a number of s nor an ISO time, such as 2014-05-01T08:00:00.25+02:00"
+            raise ValueError(f"row {table.rows[row]}: {column} is {value[:40]!r}, {wanted}") from error
+    if len({moment.tzinfo is None for moment in moments}) > 1:
+        raise ValueError(f"some times of {column} have a zone, others have none")
+    return [(moment - moments[0]).total_seconds() for moment in moments]
 
 
 def _values(table: Table, names: Sequence[str], rows: slice) -> tuple[Array, list[str]]:

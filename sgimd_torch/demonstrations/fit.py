@@ -5,10 +5,14 @@ The equation is that of Nguyen & Oudeyer (2014).    misfit_of(rod, theta_d, demo
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
 from sgimd_torch.environments.protocol import Environment, primitive_of
 from sgimd_torch.spaces import Array, Demonstration
+
+LONG: Final = 60.0  # s, length from which on a recording with few samples may be in another unit
 
 
 def misfit_of(environment: Environment, theta: Array, demonstration: Demonstration) -> float:
@@ -26,6 +30,16 @@ def misfit_of(environment: Environment, theta: Array, demonstration: Demonstrati
     return float(np.sqrt(np.mean((played - trajectory) ** 2)))
 
 
+def slow_clock(demonstration: Demonstration) -> list[str]:
+    """A sentence if the times of a recording look like ms, us or ns: over a minute long, with 1 s between samples."""
+    times = demonstration.times
+    lasts, step = float(times[-1] - times[0]), float(np.median(np.diff(times)))
+    if lasts < LONG or step < 1:
+        return []
+    unit = "ms" if step < 1e3 else "us" if step < 1e6 else "ns"
+    return [f"lasts {lasts:.2g} s, with {step:.2g} s between samples; are its times in {unit}?"]
+
+
 def beyond_limits(environment: Environment, demonstration: Demonstration) -> list[str]:
     """Sentences, one for each limit of the robot that a recording exceeds."""
     remarks, primitive = list[str](), primitive_of(environment)
@@ -37,6 +51,7 @@ def beyond_limits(environment: Environment, demonstration: Demonstration) -> lis
             name = box.names[joint] if box.names else f"joint {joint}"
             angle = f"{name} is {trajectory[sample, joint]:.3g} at sample {sample}"
             remarks.append(f"{angle}, outside its range [{box.low[joint]:g}, {box.high[joint]:g}]")
+    remarks += slow_clock(demonstration)
     shortest, longest = primitive.durations
     lasts = float(demonstration.times[-1] - demonstration.times[0])
     if not shortest * (1 - 1e-9) <= lasts <= longest * (1 + 1e-9):

@@ -12,7 +12,13 @@ from typing import Any, Final
 import numpy as np
 
 from sgimd_torch.environments.previous import WithPrevious
-from sgimd_torch.environments.protocol import BatchEnvironment, Environment, check_instance, check_robot
+from sgimd_torch.environments.protocol import (
+    BatchEnvironment,
+    Environment,
+    check_instance,
+    check_robot,
+    moves_in_batches,
+)
 from sgimd_torch.spaces import Array, Box, check_count, stream
 
 _FACTOR: Final = 10.0  # largest accepted ratio between announced and measured noise; a wrong unit exceeds it
@@ -201,7 +207,9 @@ def _noise(environment: Environment, tried: Movements) -> Iterator[str]:
 
 
 def _batches(environment: Environment, tried: Movements) -> Iterator[str]:
-    if not isinstance(environment, BatchEnvironment):
+    if not moves_in_batches(environment):
+        if isinstance(environment, BatchEnvironment):
+            yield _Remark("execute_many() is a parent's, execute() is not: movements are made one by one, by execute()")
         return
     contexts, thetas = (np.stack(part) for part in zip(*tried, strict=True))
 
@@ -265,8 +273,9 @@ def _call(environment: Environment, name: str, *arguments: Any) -> Any:
 
 
 def _misshapen(what: str, value: Any, *shape: int) -> str | None:
-    if not isinstance(value, np.ndarray):
+    if not isinstance(value, np.ndarray) or isinstance(value, np.ma.MaskedArray):
         hint = "is its return missing?" if value is None else "np.array([x]) makes one"
+        hint = "raise SimulationError where there is no outcome" if isinstance(value, np.ma.MaskedArray) else hint
         return f"{what} must give an array of shape {shape}, got {type(value).__name__}; {hint}"
     if value.shape != shape or value.dtype != np.float64:
         hint = "is it called with one movement?" if value.ndim != len(shape) else "was an axis or a dtype forgotten?"

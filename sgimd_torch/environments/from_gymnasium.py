@@ -8,6 +8,7 @@ A controller of your own needs the two members of `Controller`. ``to_gymnasium.p
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Sequence
 from copy import deepcopy
 from functools import cached_property
@@ -18,6 +19,7 @@ from numpy.typing import ArrayLike
 
 from sgimd_torch.environments.controllers import Controller
 from sgimd_torch.environments.protocol import Primitive, SimulationError, check_movement, check_recording, check_robot
+from sgimd_torch.environments.remarks import FEWEST, LATEST
 from sgimd_torch.spaces import Array, Box, check_count, check_point, check_rng, stream
 
 try:
@@ -92,6 +94,16 @@ class FromGymnasium:
                 f"gymnasium.make(..., max_episode_steps={self.steps}), or choose fewer steps"
             )
         self._outcome, self._context = outcome, context
+        self._ended = deque[int](maxlen=LATEST)  # actions of each of the latest episodes that ended early, else 0
+
+    @property
+    def noticed(self) -> str:
+        """Sentence about episodes that end early, "" if most do not; see `Noticing`."""
+        early = [n for n in self._ended if n]
+        if 2 * len(early) < max(len(self._ended), FEWEST):
+            return ""
+        when = f"after {np.median(early):g} of {self.steps} actions (median): the later ones do nothing"
+        return f"{len(early)} of the last {len(self._ended)} episodes ended early, {when}"
 
     def observe(self, rng: np.random.Generator) -> Array:
         """``(context_dim,)``, the context of a random start of an episode; it is empty if the start counts as noise.
@@ -137,7 +149,8 @@ class FromGymnasium:
         """The context of the start with this ``seed``."""
         assert self._context is not None
         first, _ = self.world.reset(seed=seed)
-        return check_point("context", np.array(self._context(first), dtype=np.float64), self.contexts.dim)
+        context = np.array(np.ma.filled(self._context(first), np.nan), dtype=np.float64)
+        return check_point("context", context, self.contexts.dim)
 
     @cached_property
     def _seeds(self) -> dict[bytes, int]:
@@ -158,10 +171,12 @@ class FromGymnasium:
             observations.append(deepcopy(observation))
             if terminated or truncated:
                 break
+        made = len(observations) - 1
+        self._ended.append(made if made < len(actions) else 0)
         warned = getattr(getattr(self.world.unwrapped, "data", None), "warning", None)
         if warned is not None and np.any(warned.number):
             raise SimulationError("MuJoCo gave a warning: the simulation diverged, or ran out of room", theta)
-        outcome = np.array(self._outcome(observations), dtype=np.float64)
+        outcome = np.array(np.ma.filled(self._outcome(observations), np.nan), dtype=np.float64)
         if not np.isfinite(outcome).all():
             raise SimulationError("the outcome is not finite", theta)
         return check_point("outcome", outcome, self.outcomes.dim)

@@ -441,10 +441,10 @@ class MujocoRobot:
             held = [self.model.body(body).name for _, body in pulled(self.model)]
             nearer = f"free {held[0]} from its mocap body: --environment.servos made" if held else ""
             nearer = nearer or "put the object nearer to the robot"
-            raise ValueError(
-                f"{len(moved)} of {EXPLORED} random movements of {file} move {', '.join(names)}, {lost} diverge; give "
-                f"low and high, which are the corners of T, or {nearer}"
-            )
+            advice = f"give low and high, which are the corners of T, or {nearer}" if len(moved) else nearer
+            advice = "write a shorter timestep into the model" if lost == EXPLORED else advice
+            what = f"{len(moved)} of {EXPLORED} random movements of {file} move {', '.join(names)}"
+            raise ValueError(f"{what}, {lost} diverge; {advice}")
         low, high = np.quantile(moved, (0.05, 0.95), axis=0)  # an object that flies away does not set the size of T
         low, high = np.minimum(low, rest) - 0.1 * (high - low), np.maximum(high, rest) + 0.1 * (high - low)
         flat = [name for name, side in zip(names, high - low, strict=True) if side < MOVED]

@@ -13,12 +13,12 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Final, Protocol, runtime_checkable
+from typing import Any, Final, Protocol, TypeGuard, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.spaces import Array, Box, Failure, check_point, check_vector, first_entry, read_only
+from sgimd_torch.spaces import Array, Box, Failure, check_point, check_vector, first_fall, read_only
 
 MEMBERS: Final = ("contexts", "policies", "outcomes", "rest", "outcome_noise", "observe", "execute")
 
@@ -68,7 +68,7 @@ class Environment(Protocol):
 
 @runtime_checkable
 class BatchEnvironment(Environment, Protocol):
-    """An environment that executes many movements faster together than one by one."""
+    """An environment that executes many movements faster together than one by one; see `moves_in_batches`."""
 
     def execute_many(self, contexts: Array, thetas: Array, rngs: Sequence[np.random.Generator]) -> Array:
         """``(n, outcome_dim)``, row i equal to ``execute(contexts[i], thetas[i], rngs[i])`` bit for bit.
@@ -165,6 +165,21 @@ class SimulationError(RuntimeError):
         return self.reason if self.theta is None else f"{self.reason}; theta={np.asarray(self.theta).tolist()}"
 
 
+def beside_execute(environment: object, name: str) -> bool:
+    """Whether the method ``name`` counts: it is defined beside ``execute`` or below it, so it is of the same robot.
+
+    Else a subclass or a wrapper has its own ``execute``, and the method would give the outcomes of its parent.
+    """
+    layers = [getattr(environment, "__dict__", {}), *map(vars, type(environment).__mro__)]
+    nearest = next((layer for layer in layers if name in layer or "execute" in layer), {name: None})
+    return getattr(environment, name, None) is not None and name in nearest
+
+
+def moves_in_batches(environment: object) -> TypeGuard[BatchEnvironment]:
+    """Whether ``execute_many`` of the environment counts, see `beside_execute`."""
+    return isinstance(environment, BatchEnvironment) and beside_execute(environment, "execute_many")
+
+
 def observed(environment: Environment, rng: np.random.Generator) -> Array:
     """The context ``(context_dim,)`` that the environment observes; one outside C by rounding is clipped, and told.
 
@@ -233,15 +248,15 @@ def execute_many(
         rngs: a stream for each movement, so that no outcome depends on other movements.
     """
     n, dim = len(thetas), environment.outcomes.dim
-    if n > 1 and isinstance(environment, BatchEnvironment):
+    if n > 1 and moves_in_batches(environment):
         try:
             with _ending_children():
-                outcomes = np.asarray(environment.execute_many(np.array(contexts), np.array(thetas), rngs))
-            if outcomes.shape != (n, dim):
-                raise ValueError(f"execute_many() must give {n} outcomes in rows, ({n}, {dim}), got {outcomes.shape}")
+                outcomes: Any = environment.execute_many(np.array(contexts), np.array(thetas), rngs)
+            if (shape := np.shape(outcomes)) != (n, dim):
+                raise ValueError(f"execute_many() must give {n} outcomes in rows, ({n}, {dim}), got {shape}")
         except (Exception, SystemExit) as error:
             return [Failure(reason_of(error), error)] * n
-        return [tried("outcome", dim, np.copy, outcome) for outcome in outcomes]
+        return [tried("outcome", dim, np.asanyarray, outcome) for outcome in outcomes]
     moves = zip(contexts, thetas, rngs, strict=True)
     return [tried("outcome", dim, environment.execute, c.copy(), theta.copy(), rng) for c, theta, rng in moves]
 
@@ -274,11 +289,8 @@ def check_recording(
     times = check_point(
         "times", check_vector("times", times, len(trajectory), "one in s for each row"), len(trajectory)
     )
-    falls = np.diff(times, prepend=-np.inf) <= 0
-    if falls.any():
-        raise ValueError(
-            f"times must increase from sample to sample, but {first_entry(times, falls)}; were rows shuffled?"
-        )
+    if fall := first_fall(times):
+        raise ValueError(f"times must increase, but sample {fall[0]} {fall[1]}")
     lasts = times[-1] - times[0]
     if lasts > longest * (1 + 1e-9):
         raise ValueError(

@@ -74,7 +74,7 @@ def traced(environment: Any, context: Array, theta: Array, rng: np.random.Genera
     name, dim = type(environment).__name__, environment.outcomes.dim
     try:
         movement: Any = environment.trace(context, theta, rng)
-    except Exception as error:  # code of the user may raise anything
+    except (Exception, SystemExit) as error:  # code of the user may raise anything
         raise ValueError(f"trace() of {name} failed: {type(error).__name__}: {error}") from error
     if hasattr(movement, "states"):  # the RodTrace of the fishing rod, or a Filmed
         return movement

@@ -54,7 +54,7 @@ class Learner:
         watcher: object that notices changes of the robot; None: nobody does.
         changes: changes of the robot so far.
         listeners: functions that are called with each `Event`, after it has happened.
-        begun: number of exemplars at the start.
+        begun, seed: number of exemplars at the start, and number from which all random streams come.
         movements: number of movements, rests and failed movements included.
 
     Raises:
@@ -75,7 +75,7 @@ class Learner:
         self.memory = problem.memory
         self.inverse: Inverse = problem.inverse
         self.listeners: list[Callable[[Event], object]] = []
-        self.begun, self.movements = len(self.memory), 0
+        self.begun, self.seed, self.movements = len(self.memory), problem.seed, 0
         self.watcher: Watcher | None = None
         self.changes: list[Change] = []
         self._life: list[tuple[int, int] | Event] = []  # events; for a movement, its row in memory and its place
@@ -318,10 +318,17 @@ class Learner:
 
         Args:
             reason: reason of the failure, for the record.
+
+        Raises:
+            RuntimeError: several robots were asked for movements; `tell_many` says which of them have failed.
         """
         if not self._asked:
             self.ask_many([Failure(reason)])
-        self.tell_many([Failure(reason)] * len(self._asked))
+        if (n := len(self._asked)) > 1:
+            raise RuntimeError(
+                f"fail() is of one robot, but {n} were asked; write tell_many([outcome, Failure(reason)])"
+            )
+        self.tell_many([Failure(reason)])
 
     def interrupt(self) -> None:
         """End all attempts under way; their movements so far count. Outcomes that were not told are no longer

@@ -23,6 +23,7 @@ from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final, Self
 
+from sgimd_torch import __version__
 from sgimd_torch.learner.events import Event
 from sgimd_torch.record.layout import (
     DERIVED,
@@ -233,11 +234,20 @@ class Record:
         self.dims: Dims = c, p, t
         tables = _tables(self.dims)  # a viewer may have added an index, a view or statistics
         if {name: statements.get(name) for name in tables} != tables:
-            raise RunError(f"its tables are not those of a record of this version; {HINT}")
+            raise RunError(f"its tables are not those of sgimd_torch {__version__}{self._made_by()}")
         self.about: dict[str, Any] = {name: json.loads(value) for name, value in self.rows("about")}
         self._n_rows = self.about.pop("rows")
         last = self._connection.execute("SELECT movement, kind FROM events ORDER BY rowid DESC LIMIT 1").fetchone()
         self.movements = 0 if last is None else movements_after(*last)
+
+    def _made_by(self) -> str:
+        """End of a message about tables of another layout: the version that wrote them, if it is known."""
+        name = "SELECT value FROM about WHERE name = 'versions'"
+        with suppress(sqlite3.Error, ValueError, TypeError, KeyError):
+            wrote = json.loads(self._connection.execute(name).fetchone()[0])
+            if wrote["sgimd_torch"] != __version__:
+                return f": sgimd_torch {wrote['sgimd_torch']} wrote it, and can read it"
+        return f"; {HINT}"
 
     def _lock(self) -> None:
         """Lock the file against other writers until this record is closed; readers are still admitted."""

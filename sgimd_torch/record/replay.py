@@ -19,7 +19,7 @@ from sgimd_torch.parts import Teacher
 from sgimd_torch.record.layout import ReplayError
 from sgimd_torch.spaces import Array, Box, Demonstration, Episode, Failure, Move, Request
 
-_HINT: Final = "was it recorded by another version, on another processor or with another configuration?"
+_HINT: Final = "was it recorded by another version or processor, or with another seed or configuration?"
 _TRAINED_ELSEWHERE: Final = (
     "movement {} was recorded with another theta: another device or processor trained the forward model. The learner "
     "remembers the recorded thetas"

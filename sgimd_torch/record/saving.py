@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 
+from sgimd_torch import __version__
 from sgimd_torch.files import replacing
 from sgimd_torch.learner import Learner
 from sgimd_torch.learner.events import Kind
@@ -34,7 +35,7 @@ def save_life(learner: Learner, path: str | os.PathLike[str]) -> None:
     with suppress(RunError), Record(path) as before:
         if "settings" in before.about:
             raise OSError(f"{path} is the record of a run, which no life replaces; choose another file")
-    about = {"begun": learner.begun}
+    about = {"begun": learner.begun, "seed": learner.seed, "versions": {"sgimd_torch": __version__}}
     with replacing(path, record=True) as partial, Record.make(partial, learner.problem.dims, about) as record:
         for event in learner.events():
             record.add(event)
@@ -78,5 +79,7 @@ def repeated(learner: Learner, path: str | os.PathLike[str], *, teacher: Teacher
         begun = record.about.get("begun", 0)
         if begun != learner.begun:
             raise ReplayError(f"{path} began with {begun} exemplars in memory, this learner began with {learner.begun}")
+        if (seed := record.about.get("seed", learner.seed)) != learner.seed:
+            raise ReplayError(f"{path} is the life of a learner with seed {seed}, this learner has seed {learner.seed}")
         exact = repeats_exactly(record.about, learner)
         yield from replay(learner, record.events(), teacher=teacher, exact=exact)

@@ -14,7 +14,7 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from functools import partial
 from typing import Any, Final
 
-from sgimd_torch.environments.protocol import BatchEnvironment, Environment, SimulationError, reason_of
+from sgimd_torch.environments.protocol import Environment, SimulationError, moves_in_batches, reason_of
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.session import Execute, live
 from sgimd_torch.spaces import Array, Failure
@@ -45,7 +45,7 @@ def executing(
         seed: number from which the random streams of the environment come.
         at_once: number of robots that move at once.
     """
-    if at_once == 1 or isinstance(environment, BatchEnvironment):
+    if at_once == 1 or moves_in_batches(environment):
         return nullcontext(live(environment, seed))
     return in_processes(make, seed, at_once)
 

@@ -13,9 +13,10 @@ from pathlib import Path
 from sgimd_torch.learner import Learner
 from sgimd_torch.record import ReplayError
 from sgimd_torch.record.saving import repeated
-from sgimd_torch.runs.directory import RUN_FILE, build_again, changed_versions, versions_of
+from sgimd_torch.runs.directory import RUN_FILE, build_again, changed_versions, sources, versions_of
 from sgimd_torch.runs.read import config_of, read_run
 from sgimd_torch.runs.run import Listening
+from sgimd_torch.runs.signals import say
 
 
 def load_learner(path: str | os.PathLike[str], *, trust: bool = False) -> Learner:
@@ -51,7 +52,11 @@ class OpenRun:
 
     def __init__(self, path: str | os.PathLike[str], *, trust: bool = False) -> None:
         self.recorded = read_run(path)
+        say(*(f"{path}: {remark}" for remark in self.recorded.remarks))
         self.parts = build_again(config_of(self.recorded, trust=trust), Path(path) / RUN_FILE)
+        now = sources(self.parts.config, self.parts.environment)
+        if changes := changed_versions(self.recorded.versions, now):
+            say(f"the robot of {path} is not what it was, and moves as it is now: {changes}")
         self._episodes = repeated(self.parts.learner, Path(path) / RUN_FILE)
 
     def replay(self, movements: int | None = None) -> None:

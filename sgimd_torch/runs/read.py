@@ -20,7 +20,8 @@ from sgimd_torch.evaluation import OwnGoals
 from sgimd_torch.files import checksum
 from sgimd_torch.learner.events import Kind
 from sgimd_torch.options.config import FILES, OWN, Config
-from sgimd_torch.record import DERIVED, Record, RunError, layout
+from sgimd_torch.record import DERIVED, Record, RunError
+from sgimd_torch.record.layout import layout
 from sgimd_torch.runs.directory import NOT_COMPARED, RUN_FILE, code_of, differing, with_found_earlier
 from sgimd_torch.spaces import Array, Box, Demonstration
 
@@ -42,6 +43,7 @@ class Run:
         summary: numbers of "movements" and of "failed" movements, whether the run is "finished", seconds by part, and
             "expected", the mean error that the learner expected when ``--until`` ended the run, or None.
         changes: descriptions of the changes of the robot that the learner noticed.
+        remarks: sentences on what the latest outcomes tell of the robot, see `remarks_on`.
         index: ``(n,)`` numbers of the movements, from 0.
         origin: ``(n,)`` origin of each movement, such as "local" or "imitate"; "" for a rest.
         demonstration: ``(n,)`` indices in ``demonstrations`` of what was shown just before each movement; -1: nothing.
@@ -85,6 +87,7 @@ class Run:
     failed: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, np.bool_))
     tolerance: float = float("nan")
     folder: str = ""
+    remarks: list[str] = field(default_factory=list)
 
     @property
     def evaluation(self) -> dict[str, Array]:
@@ -166,6 +169,7 @@ def read_run(path: str | os.PathLike[str]) -> Run:
             robot=about["robot"],
             words=about["words"],
             folder=about.get("folder", ""),
+            remarks=[*about.get("remarks", {}).values()],
             tolerance=about.get("tolerance", float("nan")),
             spaces={name: Box(*box) for name, box in about["spaces"].items()},
             summary={
@@ -250,7 +254,8 @@ def config_of(run: Run, *, trust: bool = False) -> Config:
             sys.path.append(run.folder)
         return Config.from_settings(run.config, Path(run.folder))
     except (TypeError, ValueError) as error:
-        raise RunError(f"the settings of {run.path} do not describe a run of this version: {error}") from error
+        told = f"the settings of {run.path}, by sgimd_torch {run.versions.get('sgimd_torch')},"
+        raise RunError(f"{told} do not describe a run of this version: {error}") from error
 
 
 def find_runs(place: str | os.PathLike[str]) -> dict[str, list[Path]]:

@@ -28,6 +28,7 @@ from sgimd_torch.spaces import Episode
 
 N_TOLD: Final = 3  # number of failures with a message each; later ones are only counted
 LOOKED_BACK: Final = (50, 100, 200)  # numbers of movements at which to test whether the robot has a memory
+REMARK_EVERY: Final = 50  # number of movements between two looks at the outcomes
 COMMIT_EVERY: Final = 1.0  # s between two commits; a killed run loses the movements since the last commit
 
 
@@ -60,6 +61,8 @@ def run_one(parts: RunParts, stopping: Stopping, *, resume: bool, again: str) ->
             if not isinstance(raised, SimulationError):
                 say("".join(traceback.format_exception(raised)).rstrip())
             said = str(error) if raised is not error else reason_of(error)
+            if isinstance(error, NoOutcomeError):
+                said += " (--failures says how many in a row end a run)"
             raise Failed(f"{said}; {loop.movements} movements are kept; to go on: {again}") from error
         return loop.summary
 
@@ -101,7 +104,7 @@ class RunLoop:
             self.listeners.append(board)
         self._wanted = parts.config.evaluations  # numbers of movements before the evaluations to come
         self._committed_at, self._kept, self._told = time.monotonic(), self.recorded, False  # at the last commit
-        self._remembers = False  # whether it was said that the robot has a memory
+        self._remarked = {*self.record.about.setdefault("remarks", {})}  # kinds of remarks that were told
 
     def __enter__(self) -> Self:
         return self
@@ -241,26 +244,41 @@ class RunLoop:
             self._evaluate()
         if self.movements == self.recorded:
             self._begin()
-        if not replayed and self.movements in LOOKED_BACK:
-            self._look_back()
+        if not replayed and self.movements % REMARK_EVERY == 0:
+            self._remark()
         if not self.replaying and time.monotonic() - self._committed_at >= COMMIT_EVERY:
             self.commit()
 
-    def _look_back(self) -> None:
-        """Say once if outcomes depend on the movement before."""
+    def _remark(self) -> None:
+        """Say what outcomes tell of the robot, each kind once; the record keeps it for tables, reports and answers."""
+        from sgimd_torch.environments.remarks import remarks_on  # a short run looks at nothing
+
+        learner, before = self.parts.learner, self.record.about["remarks"]
+        found = remarks_on(self.parts.environment, learner.memory.outcomes[learner.begun :])
+        if "memory" in before:
+            found["memory"] = before["memory"]
+        elif (text := self._remark_on_memory()) is not None:
+            found["memory"] = text
+        self.record.about["remarks"] = found
+        say(*(text for kind, text in found.items() if kind not in self._remarked))
+        self._remarked |= found.keys()
+
+    def _remark_on_memory(self) -> str | None:
+        """What to say if outcomes depend on the movement before."""
         config, learner = self.parts.config, self.parts.learner
-        if self._remembers or config.context or config.at_once > 1 or not learner.inverse.says_how_sure:
-            return
+        looked = self.movements in LOOKED_BACK and not config.context and config.at_once == 1
+        if not looked or not learner.inverse.says_how_sure:
+            return None
         from sgimd_torch.changes.carried_over import error_knowing_previous  # short runs do not need it
 
         with self.seconds.of("learner"):
             share = error_knowing_previous(learner)
-        if share is not None:
-            self._remembers = True
-            say(
-                f"outcomes depend on the movement before, which would explain {1 - share:.0%} of the error of "
-                "predictions: give it as context (--context previous), or return to the same state before each movement"
-            )
+        if share is None:
+            return None
+        return (
+            f"outcomes depend on the movement before, which would explain {1 - share:.0%} of the error of predictions: "
+            "give it as context (--context previous), or return to the same state before each movement"
+        )
 
     def _ends_early(self) -> bool:
         """Whether --until ends the run now; then there is a last evaluation."""

@@ -1,8 +1,11 @@
-"""Ask a run for movements: theta for each goal, the outcome that the run expects, and how far it may be off.
+"""Ask a run for movements: theta for each goal, and the outcome that the run expects.
 
-That is the mean distance from the expected outcome, noise included, in the unit of T.
-The learner repeats its record, then its inverse model answers. With --execute, the robot of the run executes each
-answer. With --out, the answers are a table for other programs; with --trajectory, the joints over time.
+expected_distance is the distance from the goal to this outcome; expected_deviation is the mean distance, noise
+included, at which outcomes of theta scatter around it. The learner repeats its record, then its inverse model answers.
+With --execute, the robot of the run executes each answer: reached is the outcome, error its distance from the goal.
+With --out, the answers are a table for other programs; with --trajectory, the joints over time.
+
+Exit code: 0 done, 1 a movement failed, 2 the request is wrong.
 
 Examples:
   sgimd ask runs/practice/seed-000 --goal 0.3,0.2
@@ -16,29 +19,34 @@ from __future__ import annotations
 import argparse
 import csv
 import io
+import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
 from sgimd_torch.environments.motor_primitives import GaussianPrimitive
-from sgimd_torch.environments.protocol import primitive_of
+from sgimd_torch.environments.protocol import execute_many, primitive_of
 from sgimd_torch.files import check_writable, write_text
 from sgimd_torch.options.build import RunParts
 from sgimd_torch.options.signature import parsed
 from sgimd_torch.runs.load import OpenRun
 from sgimd_torch.runs.past import read_csv
-from sgimd_torch.runs.signals import parser_of
-from sgimd_torch.spaces import Array, Box, stream
+from sgimd_torch.runs.signals import Failed, parser_of
+from sgimd_torch.spaces import Array, Box, Failure, stream
 
 Answer = dict[str, Array]
-"""Vectors of an answer, by the names "goal", "context", "theta", "expected", "expected_deviation" and "reached"."""
+"""Vectors of an answer, by the names "goal", "context", "theta", "expected" and "reached", and ``DISTANCES``, of one
+entry each; NaN after a failed movement."""
+DISTANCES: Final = ("expected_distance", "expected_deviation", "error")  # in the unit of T
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Print or write the answers and return the exit code 0.
 
     Raises:
+        Failed: a movement failed; all answers are printed or written before.
         ValueError: the request is wrong, or a goal or the context lies outside its space.
         OSError: a file cannot be read or written.
     """
@@ -51,20 +59,19 @@ def main(argv: Sequence[str] | None = None) -> int:
     if not goals or (options.trajectory and len(goals) > 1):
         raise ValueError("give --goal X,Y or --goals FILE; --trajectory takes one goal")
     run.replay()
-    answers = list(_answers(parts, goals, options.context, execute=options.execute))
+    answers = list(_answers(parts, goals, options.context))
+    failed = list(_execute(parts, answers)) if options.execute else []
     if options.trajectory:
         _write_trajectory(options.trajectory, parts, answers[0]["theta"])
     if options.out is None:
-        for answer in answers:
-            print("; ".join(f"{name} {_text(value)}" for name, value in answer.items() if len(value)))
-        return 0
-    heads = [
-        name if name == "expected_deviation" else f"{name}_{k}"
-        for name, value in answers[0].items()
-        for k in range(len(value))
-    ]
-    _write(options.out, heads, (np.concatenate([*answer.values()]) for answer in answers))
-    print(f"{len(answers)} answers: {options.out}")
+        print("\n".join(_line(answer, parts.environment.outcomes) for answer in answers))
+    else:
+        sizes = {name: len(value) for name, value in answers[0].items()}
+        heads = [name if name in DISTANCES else f"{name}_{k}" for name, n in sizes.items() for k in range(n)]
+        _write(options.out, heads, (np.concatenate([*answer.values()]) for answer in answers))
+        print(f"{len(answers)} answers: {options.out}")
+    if failed:
+        raise Failed(f"{len(failed)} of {len(answers)} movements failed, the first for {failed[0]}")
     return 0
 
 
@@ -84,9 +91,7 @@ def parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _answers(
-    parts: RunParts, goals: Sequence[Sequence[float]], given: Sequence[float] | None, *, execute: bool
-) -> Iterator[Answer]:
+def _answers(parts: RunParts, goals: Sequence[Sequence[float]], given: Sequence[float] | None) -> Iterator[Answer]:
     robot, inverse = parts.environment, parts.learner.inverse
     if given is None and parts.config.context:
         names = ", ".join(robot.contexts.names)
@@ -95,7 +100,7 @@ def _answers(
     context = robot.contexts.check("--context", middle if given is None else given)
     if not len(parts.learner.memory):
         raise ValueError(f"{parts.config.directory} has an empty memory, so it infers no movement")
-    for k, point in enumerate(goals):
+    for point in goals:
         goal = robot.outcomes.check("goal", point, "it is a point of T, such as 0.3,0.2")
         estimate = inverse(context, goal)
         theta, expected = estimate.theta, estimate.expected
@@ -104,11 +109,22 @@ def _answers(
             expected = inverse.predict(context, theta)
         if expected is not None:
             answer["expected"] = expected
+            answer["expected_distance"] = np.array([math.dist(expected, goal)])
         if estimate.sd is not None:
             answer["expected_deviation"] = np.array([estimate.expected_deviation])
-        if execute:
-            answer["reached"] = robot.execute(context, theta, stream(parts.config.seed, "ask", k))
         yield answer
+
+
+def _execute(parts: RunParts, answers: Sequence[Answer]) -> Iterator[str]:
+    """Add to each answer what the robot reaches with it; yields a reason for each movement that fails."""
+    robot = parts.environment
+    for k, answer in enumerate(answers):
+        rng = stream(parts.config.seed, "ask", k)
+        (reached,) = execute_many(robot, [answer["context"]], [answer["theta"]], [rng])
+        if isinstance(reached, Failure):
+            yield f"goal {_text(answer['goal'])}: {reached.reason}"
+            reached = np.full(robot.outcomes.dim, np.nan)
+        answer |= {"reached": reached, "error": np.array([math.dist(reached, answer["goal"])])}
 
 
 def _read(path: Path, box: Box) -> list[list[float]]:
@@ -137,8 +153,17 @@ def _write(path: Path, heads: Sequence[str], rows: Iterator[Array] | Array) -> N
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow(heads)
-    table.writerows([float(x) for x in row] for row in rows)
+    table.writerows(["" if np.isnan(x) else float(x) for x in row] for row in rows)
     write_text(path, text.getvalue())
+
+
+def _line(answer: Answer, box: Box) -> str:
+    """An answer as text, without what is not known."""
+    known = {name: value for name, value in answer.items() if len(value) and np.isfinite(value).all()}
+    return "; ".join(
+        f"{name} {box.amount(value.item(), '.4g') if name in DISTANCES else _text(value)}"
+        for name, value in known.items()
+    )
 
 
 def _text(value: Array) -> str:

@@ -32,7 +32,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from sgimd_torch.environments.check import check_environment
-from sgimd_torch.environments.protocol import Environment, execute_many
+from sgimd_torch.environments.protocol import Environment, beside_execute, execute_many
+from sgimd_torch.environments.remarks import remarks_on
 from sgimd_torch.environments.sketch import traced
 from sgimd_torch.options.build import task_of
 from sgimd_torch.options.command_line import parse
@@ -42,8 +43,7 @@ from sgimd_torch.runs.tasks.taught import demonstrations_of
 from sgimd_torch.spaces import Failure, check_count, stream
 from sgimd_torch.views.demonstrations import check
 
-TRIED = 20  # number of random movements that estimate the reached part of T
-NARROW = 0.03  # share of the volume of T; if the outcomes of random movements span less, a note warns the user
+TRIED = 20  # number of random movements whose outcomes are looked at
 
 
 def parser() -> argparse.ArgumentParser:
@@ -88,7 +88,7 @@ def _check_picture(task: Task) -> None:
         ValueError: the outcomes differ, or the movement cannot be traced; see `traced`.
     """
     robot = task.environment
-    if getattr(robot, "trace", None) is None:
+    if not beside_execute(robot, "trace"):
         return
     context, theta = robot.observe(stream(0, "check")), robot.policies.sample(stream(1, "check"))
     outcome = robot.execute(context.copy(), theta.copy(), stream(2, "check"))
@@ -103,29 +103,19 @@ def _check_picture(task: Task) -> None:
 
 def _goals(task: Task) -> list[str]:
     goals, notes, _ = benchmark_of(task, None)
-    notes = [f"goals of evaluation: {len(goals.goals)}", *notes, *_narrow(task.environment)]
+    notes = [f"goals of evaluation: {len(goals.goals)}", *notes, *_remarks(task.environment)]
     return [f"  {line}" for line in notes]
 
 
-def _narrow(robot: Environment) -> list[str]:
-    """A warning if random movements end outside T, or if their outcomes span a small part of T; [] for none."""
-    space, rngs = robot.outcomes, [stream(k, "check") for k in range(TRIED)]
+def _remarks(robot: Environment) -> list[str]:
+    """What random movements tell of the robot, see `remarks_on`."""
+    rngs = [stream(k, "check") for k in range(TRIED)]
     contexts, thetas = [robot.observe(rng) for rng in rngs], [robot.policies.sample(rng) for rng in rngs]
     executed = execute_many(robot, contexts, thetas, rngs)
-    if lost := [outcome.reason for outcome in executed if isinstance(outcome, Failure)]:
-        return [f"{len(lost)} of {TRIED} random movements failed, such as: {lost[0]}"]
-    outcomes = np.array(executed)
-    low, high = outcomes.min(axis=0), outcomes.max(axis=0)
-    share = float(np.prod((high - low) / space.sides))
-    spans = " x ".join(f"[{a:.3g}, {b:.3g}]" for a, b in zip(low, high, strict=True))
-    if not space.contains(outcomes).any():
-        return [f"0 of {TRIED} random movements ended in T; they span {spans}. Are T and outcomes in the same unit?"]
-    if share >= NARROW:
-        return []
-    return [
-        f"{TRIED} random movements span only {100 * share:.2g} % of T, {spans}; if no movement gets much farther, make "
-        "T smaller, because learners draw goals from all of T"
-    ]
+    lost = [outcome.reason for outcome in executed if isinstance(outcome, Failure)]
+    failed = [f"{len(lost)} of {TRIED} random movements failed, such as: {lost[0]}"] if lost else []
+    outcomes = [outcome for outcome in executed if not isinstance(outcome, Failure)]
+    return [*failed, *remarks_on(robot, np.reshape(outcomes, (len(outcomes), robot.outcomes.dim))).values()]
 
 
 def _lessons(task: Task) -> list[str]:

@@ -39,14 +39,21 @@ from sgimd_torch.demonstrations.columns import ColumnNames, Recording
 from sgimd_torch.demonstrations.fit import beyond_limits, misfit_of
 from sgimd_torch.demonstrations.text import read_text
 from sgimd_torch.demonstrations.units import in_units, paced
-from sgimd_torch.environments.protocol import Replaying, SimulationError, primitive_of
+from sgimd_torch.environments.protocol import (
+    Replaying,
+    SimulationError,
+    beside_execute,
+    execute_many,
+    primitive_of,
+    tried,
+)
 from sgimd_torch.files import check_regular, check_writable
 from sgimd_torch.options.build import task_of
 from sgimd_torch.options.command_line import parse
 from sgimd_torch.runs.signals import parsed_argument, parser_of, say
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.runs.tasks.taught import theta_of
-from sgimd_torch.spaces import Array, Box, Demonstration, check_point, stream
+from sgimd_torch.spaces import Array, Box, Demonstration, Failure, stream
 from sgimd_torch.units import units_from
 from sgimd_torch.views.results import print_table
 
@@ -255,12 +262,17 @@ def check(task: Task, demonstration: Demonstration, row: int) -> Checked:
             )
         context = robot.contexts.check("its context", demonstration.context)
         theta = theta_of(task, demonstration)
-        executed = robot.execute(context.copy(), theta.copy(), stream(row, "demonstrations check"))
-        lands = check_point("outcome", executed, robot.outcomes.dim)
+        (lands,) = execute_many(robot, [context], [theta], [stream(row, "demonstrations check")])
+        if isinstance(lands, Failure):
+            raise SimulationError(lands.reason)
         if not demonstration.outcome.size:
             outcome = lands
-            if isinstance(robot, Replaying) and not context.size:  # a replay has no context
-                outcome = robot.replay(demonstration.times, demonstration.trajectory)
+            # A replay has no context.
+            if isinstance(robot, Replaying) and beside_execute(robot, "replay") and not context.size:
+                replayed = tried("outcome", len(lands), robot.replay, demonstration.times, demonstration.trajectory)
+                if isinstance(replayed, Failure):
+                    raise SimulationError(f"its replay failed: {replayed.reason}")
+                outcome = replayed
             demonstration = replace(demonstration, outcome=outcome)
             remarks = beyond_limits(robot, demonstration)
     except (ValueError, SimulationError) as error:

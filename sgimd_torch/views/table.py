@@ -33,7 +33,7 @@ from sgimd_torch.runs.read import Run
 from sgimd_torch.runs.signals import parser_of, say
 from sgimd_torch.views.results import Column, print_csv, print_table, results
 from sgimd_torch.views.statistics import LEAST_SEEDS
-from sgimd_torch.views.variants import Variant, baseline_of, best_first, compare, differing, read_runs, unit_of
+from sgimd_torch.views.variants import Variant, baseline_of, best_first, compare, differing, read_runs, unalike, unit_of
 
 
 def parser() -> argparse.ArgumentParser:
@@ -81,11 +81,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     else:
         cells = ([column.head, *column.texts()] for column in columns)
         print_table(list(zip(["variant", *names], *cells, strict=True)))
+    say(*unalike(variants))
     if few := [f"{variant.name} ({len(variant.used or variant.runs)})" for variant in variants if variant.few]:
         say(f"fewer than {LEAST_SEEDS} seeds, too few for an interval: {', '.join(few)}")
     for variant in variants:
         if others := [option for option in differing([variant]) if option not in MAY_CHANGE]:
             say(f"{variant.name}: its seeds differ in {', '.join(others)}; were two studies given one --name?")
+    say(*(f"{run.path}: {remark}" for run in runs for remark in run.remarks))
     say(*(f"left out: {reason}" for reason in left_out))
     return 0
 

@@ -50,8 +50,19 @@ def read_runs(place: Path) -> dict[str, list[Run]]:
 
 
 def best_first(variants: Iterable[Variant]) -> list[Variant]:
-    """Variants in the order of their last errors, the smallest first; variants without an error come last."""
-    return sorted(variants, key=lambda v: (v.last_error.value if v.last_error else np.inf, v.name))
+    """Variants in the order of their last errors in each unit, the smallest first; those without an error come last."""
+    return sorted(
+        variants, key=lambda v: (not v.last_error, v.space.unit, v.last_error.value if v.last_error else 0.0, v.name)
+    )
+
+
+def unalike(variants: Sequence[Variant]) -> list[str]:
+    """A sentence if the errors of variants have different units."""
+    names: dict[str, list[str]] = {}
+    for variant in variants:
+        names.setdefault(variant.space.unit or "no unit", []).append(variant.label)
+    told = "; ".join(f"{', '.join(labels)} in {unit}" for unit, labels in names.items())
+    return [f"Errors have different units, so they cannot be compared: {told}"] if len(names) > 1 else []
 
 
 def unit_of(variants: Sequence[Variant]) -> Callable[[str], str]:
@@ -275,11 +286,12 @@ def baseline_of(variants: Sequence[Variant], name: str | None = None) -> Variant
 
 
 def compare(variants: Sequence[Variant], baseline: Variant | None) -> list[Comparison]:
-    """Comparisons of variants with the baseline: those that share seeds and the last number of movements with it."""
+    """Comparisons of variants with the baseline: those that share seeds, last number of movements and unit with it."""
     if baseline is None:
         return []
     theirs, at = _last_errors(baseline), baseline.compared_at
     others = [variant for variant in variants if variant is not baseline and variant.compared_at == at]
+    others = [variant for variant in others if variant.space.unit == baseline.space.unit]
     pairs = [(variant, common_differences(_last_errors(variant), theirs)) for variant in others]
     return [
         Comparison(variant, differences, mean) for variant, differences in pairs if (mean := over_seeds(differences))

@@ -1,8 +1,11 @@
 """Recordings as people have them become demonstrations: text, LeRobot; and are checked against a robot."""
 
+import dataclasses
+import functools
 import json
 import os
 import re
+from datetime import UTC, datetime, timedelta
 
 import numpy as np
 import pyarrow as pa
@@ -13,7 +16,7 @@ from hypothesis import strategies as st
 
 from sgimd_torch.__main__ import _call
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
-from sgimd_torch.demonstrations.columns import ColumnNames
+from sgimd_torch.demonstrations.columns import ColumnNames, Table, recordings_of
 from sgimd_torch.demonstrations.text import read_text
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.protocol import SimulationError
@@ -28,8 +31,8 @@ POINTER = "version https://git-lfs.github.com/spec/v1\noid sha256:abc\nsize 9\n"
 NAMED = "--joints a,b --outcome x,y"
 
 
-def sgimd(*words):
-    return command(_call, ["demonstrations", *map(str, words)])
+def sgimd(*words, view="demonstrations"):
+    return command(_call, [view, *map(str, words)])
 
 
 @st.composite
@@ -83,6 +86,12 @@ def degrees(text):
     return text
 
 
+def timed(*times):
+    """``ONE`` with times of a day."""
+    rows = zip(("2.0", "2.5", "3.0"), times, strict=True)
+    return functools.reduce(lambda text, row: text.replace(f"\n{row[0]}", f"\n2014-05-01T{row[1]}"), rows, ONE)
+
+
 # Texts that hold the recording of ONE, and the options that read them.
 RIGHT = {
     "names with spaces and units": (
@@ -99,6 +108,9 @@ RIGHT = {
     "degrees of all but these": (ONE, f"{NAMED} --unit deg,a=rad,b=rad"),
     "twice as slow": (ONE.replace("2.5", "3.0").replace("3.0,0.5", "4.0,0.5"), f"{NAMED} --speed 2"),
     "a vector": (ONE, "--joints a,b[0] --outcome x,y"),
+    "ISO times with zones": (timed("08:00:02+02:00", "08:00:02.5+02:00", "06:00:03Z"), NAMED),
+    "ISO times without zones": (timed("08:59:59.9", "09:00:00.4", "09:00:00.9"), NAMED),
+    "an outcome in the last row alone": (ONE.replace(",9,9", ",,"), NAMED),
 }
 SEMICOLONS = ONE.replace(",", ";")
 JERK = ONE.replace("2.0,", "1.999,9.1,0.2,9,9\n2.0,").replace("2.5", "8.5").replace("3.0,", "11.,")
@@ -119,15 +131,29 @@ REFUSED = {
     "a number of Python": (ONE.replace("0.3", "1_0"), NAMED, "row 3: a is '1_0', no number"),
     "hexadecimals": (ONE.replace("0.3", "0x3"), NAMED, "row 3: a is '0x3', no number"),
     "a minus that is none": (ONE.replace("0.1", "\u22120.1"), NAMED, "row 2: a is '\u22120.1', no number; is a field"),
-    "dates": ("time,a,b,x,y\n" + "1-1 9:00,0.1,0.2,9,-\n" * 2, NAMED, "row 2: y is '-', no number"),
+    "dates": ("time,a,b,x,y\n" + "1-1 9:00,0.1,0.2,9,-\n" * 2, NAMED, "row 3: y is '-', no number"),
+    "days": (
+        "time,a,b,x,y\n" + "1-1 9:00,0.1,0.2,9,9\n" * 2,
+        NAMED,
+        "row 2: time is '1-1 9:00', neither a number of s",
+    ),
+    "some zones": (timed("08:00:02Z", "08:00:02.5", "08:00:03"), NAMED, "some times of time have a zone, others have"),
     "points and commas": (SEMICOLONS.replace("0.3", "1.000,3"), NAMED, "row 3: a is '1.000,3', no number"),
     "decimal commas between commas": (ONE.replace("0.", "0,"), NAMED, "row 2 has 7 fields instead of 5"),
     "a remark between rows": (ONE.replace("\n2.5", "\n# lost\n2.5"), NAMED, "row 3 has 1 fields instead of 5"),
     "a name over two lines": (ONE.replace("time", '"time\ns"'), NAMED, "it has no column"),
     "a file of one sign": ("0" * 200_000, NAMED, "it is no table: field larger than"),
     "no end of digits": (ONE.replace("0.3", "9" * 400), NAMED, "row 3: a must be finite, got"),
-    "times that fall": (ONE.replace("2.5", "1.5"), NAMED, "row 3: time must increase from row to row; were rows shuf"),
-    "times that stay": (ONE.replace("2.5", "2.0"), NAMED, "row 3: time must increase"),
+    "times that fall": (
+        ONE.replace("2.5", "1.5"),
+        NAMED,
+        "row 3: time must increase .* at 1.5 s, after 2 s; were rows",
+    ),
+    "a time twice": (ONE.replace("2.5", "2.0"), NAMED, "row 3: .* at 2 s, as the one before; was it written twice"),
+    "float32 epochs": (
+        *(re.sub(r"\n\d[.]\d", "\n1700000000", ONE), NAMED),
+        "row 3: .* at 1700000000 s, as the one before, and so are 1 more; are times epochs in float32",
+    ),
     "a field too many": (ONE.replace(",9,9\n2.5", ",9,9,9\n2.5"), NAMED, "row 2 has 6 fields instead of 5"),
     "one row": ("\n".join(ONE.splitlines()[:2]), NAMED, "it has 1 sample, but needs 2 or more"),
     "no rows": (ONE.splitlines()[0], NAMED, "it has no rows below the names"),
@@ -415,11 +441,32 @@ def test_check_prints_where_recordings_land_and_names_those_that_cannot_be_used(
     assert re.search("error: 1 of 2 recordings of .*shown.npz cannot be used; the first is 1: .* in deg", printed.err)
 
     def execute(self, context, theta, rng):
-        raise SimulationError("it hit the table")
+        raise failures.pop(0)
 
     monkeypatch.setattr(PlanarArm, "execute", execute)
-    assert sgimd(*words) == 2
-    assert "cannot be used: it hit the table" in capsys.readouterr().out
+    failures = [SimulationError("it hit the table"), SystemExit(0)]
+    for reason in ("it hit the table", "SystemExit: 0"):
+        assert sgimd(*words) == 2
+        assert f"cannot be used: {reason}" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1e3, "ms"), (1e6, "us"), (1e9, "ns"), (1, None)])
+def test_times_in_another_unit_are_suspected_on_a_robot_of_any_speed(tmp_path, capsys, factor, unit):
+    shown = bent(0.1, landing(0.1))
+    save_demonstrations(tmp_path / "shown.npz", [dataclasses.replace(shown, times=factor * shown.times)])
+    assert sgimd("check", tmp_path / "shown.npz", "--environment", "planar-arm-7") == 0
+    said = f"lasts {factor:.2g} s, with {factor / 5:.2g} s between samples; are its times in {unit}?"
+    assert (said in capsys.readouterr().out) == (unit is not None)
+    words = "--environment planar-arm-7 --algorithm observation --movements 5 --evaluate-at [] --demonstrations"
+    assert sgimd(*words.split(), tmp_path / "shown.npz", "--out", tmp_path, view="run") == 0
+    assert (f"recording 0 {said}" in capsys.readouterr().err) == (unit is not None)
+
+
+def test_a_table_may_have_moments_for_times():
+    moments = np.array([datetime(2014, 5, 1, 8, tzinfo=UTC) + timedelta(seconds=k / 4) for k in range(3)])
+    table = Table("dataset", {"time": moments, "a": np.arange(3.0)}, range(3), {})
+    (recording,) = recordings_of(table, ColumnNames(("a",)))
+    assert recording.demonstration.times.tolist() == [0, 0.25, 0.5]
 
 
 SERVANT = """
@@ -442,6 +489,10 @@ class Servant:
 class Replays(Servant):
     def replay(self, times, trajectory):
         return trajectory[-1] + times[-1]
+
+class Halves(Replays):
+    def execute(self, context, theta, rng):
+        return super().execute(context, theta, rng) / 2
 
 class Slow(PlanarArm):
     primitive = GaussianPrimitive(Box.cube(-1, 1, 2), (0.8, 1.6))
@@ -491,6 +542,8 @@ def test_shares_of_ranges_become_angles_of_the_robot_and_its_movement_gives_the_
     assert "1 of 1 can be used; they land 0.000 (median)" in capsys.readouterr().out
     (shown,) = of_servant(tmp_path, module, [SHARES], *words, robot="Replays")
     np.testing.assert_allclose(shown.outcome, [0.4, 4.2])  # of the replay, which lasts 1 s
+    (shown,) = of_servant(tmp_path, module, [SHARES], *words, robot="Halves")
+    np.testing.assert_allclose(shown.outcome, [-0.3, 1.6], atol=0.05)  # the replay is that of another robot
     assert of_servant(tmp_path, module, [SHARES], "--joints", "turn", "--unit=-100:100") is None
     assert "the robot has 2 joints, the recordings have 1: turn" in capsys.readouterr().err
 

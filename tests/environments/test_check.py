@@ -149,6 +149,13 @@ class Warm(Cannon):
         return context + theta[:1] + 1e-5 * (self.calls % 3)
 
 
+def test_an_execute_many_that_does_not_count_is_remarked():
+    (remark,) = check_environment(
+        type("Own", (Cannon,), {"execute": lambda self, *given: Cannon.execute(self, *given)})()
+    )
+    assert remark.startswith("execute_many() is a parent's, execute() is not: movements are made one by one")
+
+
 def test_a_repeat_that_differs_by_rounding_is_a_remark_with_the_difference():
     (remark,) = check_environment(Warm())
     assert re.match(r"a repeated movement .* ends [12]e-05 away, as by rounding", remark)
@@ -224,7 +231,7 @@ def test_the_command_says_what_it_found(capsys):
 def test_a_task_space_much_larger_than_random_movements_reach_is_told(arms, capsys):
     assert command(_call, ["check", "my_arms:Wide"]) == 0
     said = capsys.readouterr().out
-    assert re.search(r"20 random movements span only 0\.\d+ % of T, \[.*\] x \[.*\]; .* make T smaller", said)
+    assert re.search(r"the last 20 outcomes span only 0\.\d+ % of T, \[.*\] x \[.*\]; .* make T smaller", said)
 
 
 @pytest.mark.parametrize(
@@ -235,7 +242,7 @@ def test_a_task_space_much_larger_than_random_movements_reach_is_told(arms, caps
         (["my_arms:clumsy"], "error: environment my_arms:clumsy cannot be made: AttributeError: 'PlanarArm'"),
         (["planar-arm-7", "--movements", "0"], "error: --movements must be a whole number >= 1"),
         (["my_arms:Exits"], "execute() raised SystemExit for theta"),
-        (["my_arms:Unseen"], "error: Unseen calls exit(0); raise an exception where a movement fails"),
+        (["my_arms:Unseen"], "error: trace() of Unseen failed: SystemExit: 0"),
         (["my_arms:Forgets"], "got NoneType; is its return missing?"),
         (["leaves:make"], "error: environment leaves:make: the module leaves cannot be imported: SystemExit: no lic"),
     ],

@@ -21,9 +21,12 @@ from sgimd_torch.environments.protocol import (
     check_movement,
     check_recording,
     execute_many,
+    moves_in_batches,
 )
 from sgimd_torch.environments.sketch import Sketch
+from sgimd_torch.evaluation import evaluate
 from sgimd_torch.spaces import Array, Box, stream
+from worlds import problem, remember
 
 NO_CONTEXT = np.empty(0)
 
@@ -83,6 +86,61 @@ def test_a_batch_is_executed_at_once_where_the_environment_can():
     assert execute_many(environment, np.empty((2, 0)), np.array([[0.25], [0.5]]), rngs) == [[0.5], [1.0]]
     assert execute_many(environment, np.empty((0, 0)), np.empty((0, 1)), []) == []
     assert environment.n_batches == 1
+
+
+class Steeper(FastSlope):
+    """As a user who knows `Environment` alone begins: another robot, from one that moves in batches."""
+
+    def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
+        return 3 * np.asarray(theta)
+
+
+class SteeperTogether(Steeper):
+    def execute_many(self, contexts: Array, thetas: Array, rngs: Sequence[np.random.Generator]) -> Array:
+        return 3 * thetas
+
+
+class Delegating:
+    """A wrapper that passes on all but ``execute``."""
+
+    def __init__(self) -> None:
+        self.inner = FastSlope()
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self.inner, name)
+
+    def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
+        return 3 * np.asarray(theta)
+
+
+def patched() -> FastSlope:
+    slope = FastSlope()
+    vars(slope)["execute"] = Steeper().execute
+    return slope
+
+
+@pytest.mark.parametrize("environment", [Steeper(), SteeperTogether(), Delegating(), patched()])
+def test_what_a_parent_does_with_a_batch_does_not_count_for_an_execute_of_ones_own(environment):
+    rngs = [stream(seed, "row") for seed in range(2)]
+    assert execute_many(environment, np.empty((2, 0)), np.array([[0.25], [0.5]]), rngs) == [[0.75], [1.5]]
+    inverse = problem(environment, memory=remember(np.array([[0.25], [0.5]]), np.array([[0.75], [1.5]]))).inverse
+    assert evaluate(inverse, environment, np.array([[0.75], [1.5]]), 0, 0).errors.tolist() == [0, 0]
+    assert moves_in_batches(environment) == isinstance(environment, SteeperTogether)
+
+
+class Hiding(FastSlope):
+    """Its sensor is silent above .7, which a masked array says."""
+
+    def execute_many(self, contexts: Array, thetas: Array, rngs: Sequence[np.random.Generator]) -> Array:
+        return np.ma.masked_array(2 * thetas, thetas > 0.7)
+
+
+def test_what_a_mask_hides_is_no_outcome():
+    rngs = [stream(seed, "row") for seed in range(2)]
+    outcomes = execute_many(Hiding(), np.empty((2, 0)), np.array([[0.25], [0.75]]), rngs)
+    assert all("got a masked array" in outcome.reason for outcome in outcomes)
+    with pytest.raises(ValueError, match="got MaskedArray; raise SimulationError where there is no outcome"):
+        check_environment(Hiding())
 
 
 class BrokenSlope(Slope):

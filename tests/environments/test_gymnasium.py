@@ -11,6 +11,7 @@ from sgimd_torch.environments.from_gymnasium import FromGymnasium, measured_nois
 from sgimd_torch.environments.motor_primitives import GaussianPrimitive
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.protocol import SimulationError
+from sgimd_torch.environments.remarks import remarks_on
 from sgimd_torch.environments.to_gymnasium import ToGymnasium
 from sgimd_torch.spaces import Box, stream
 
@@ -91,6 +92,23 @@ def test_a_movement_is_an_episode_of_the_controllers_commands():
     outcome = robot.execute(NO_CONTEXT, theta, stream(0, "any"))
     np.testing.assert_allclose(outcome, [0.1 * 0.1 * 20 * 21 / 2, 0.0], atol=1e-12)  # the sum of speeds .1, .2 .. 2
     np.testing.assert_allclose(robot.world.actions, [[1.0, 0.0]] * 20, atol=1e-7)
+
+
+def test_what_a_mask_hides_is_no_outcome():
+    robot = sled(outcome=lambda observations: np.ma.masked_array([0.1, 0.2], [False, True]))
+    with pytest.raises(SimulationError, match="the outcome is not finite"):
+        robot.execute(NO_CONTEXT, np.full(9, 0.5), stream(0, "any"))
+
+
+def test_a_world_that_ends_most_episodes_early_is_told_and_one_that_seldom_does_is_not():
+    away = np.array([1.0] * 8 + [0.5])  # as fast as it can
+    robots = {ends_at: sled(world=Sled(ends_at=ends_at, noise=0.0)) for ends_at in (0.1, 9.0)}
+    for robot in robots.values():
+        for k in range(12):
+            robot.execute(NO_CONTEXT, away, stream(k, "any"))
+    said = "12 of the last 12 episodes ended early, after 4 of 20 actions (median): the later ones do nothing"
+    assert remarks_on(robots[0.1], np.zeros((0, 2))) == {"noticed": said}
+    assert not remarks_on(robots[9.0], np.zeros((0, 2)))
 
 
 @pytest.mark.parametrize(

@@ -40,6 +40,11 @@ class Shifted(Slider2):
 class NoPicture(Slider):
     trace = None
 
+class OtherMovement(Slider):
+    """A subclass whose picture would be that of its parent."""
+    def execute(self, context, theta, rng):
+        return 2 * super().execute(context, theta, rng)
+
 class WrongPicture(Slider):
     def trace(self, context, theta, rng):
         return [0.0, 1.0]

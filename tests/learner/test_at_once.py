@@ -199,6 +199,18 @@ def test_what_execute_many_does_wrong_fails_the_movements_that_it_concerns(outco
         assert bool(reason) == bool(episode.failed)
 
 
+def test_the_failure_of_one_robot_is_not_that_of_all():
+    learner = practice(ARM, 0)
+    learner.ask_many([np.zeros(0)] * 3)
+    with pytest.raises(RuntimeError, match=r"fail\(\) is of one robot, but 3 were asked; write tell_many"):
+        learner.fail("lost")
+    learner.tell_many([Failure("lost"), np.zeros(2), np.zeros(2)])
+    assert (learner.movements, len(learner.memory)) == (3, 2)
+    learner.ask(np.zeros(0))
+    learner.fail("lost")
+    assert (learner.movements, len(learner.memory)) == (4, 2)
+
+
 def test_too_many_failures_end_the_run_after_the_whole_group():
     robot, episodes = Together(lost), []
     learner = practice(robot, 0)

@@ -156,7 +156,7 @@ class Lives(RuleBasedStateMachine):
         move = self.both(lambda learner, _: learner.ask(context))
         self.contexts = [] if move is None else [context]
 
-    @precondition(lambda self: self.teacher is None)
+    @precondition(lambda self: self.teacher is None and len(self.contexts) < 2)
     @rule()
     def fail(self):
         self.both(lambda learner, _: learner.fail("lost"))
@@ -325,7 +325,7 @@ def first_posture(times, trajectory):
 
 
 REFUSED = {  # message: error, learner, and, if there is one, its teacher
-    "movement 0 was recorded with another theta: theta_3 was": (ReplayError, lambda: taught(7)),
+    "life.sqlite is the life of a learner with seed 6, this learner has seed 7": (ReplayError, lambda: taught(7)),
     "movement 20 was recorded with another theta": (ReplayError, lambda: taught(6, first_posture)),
     "movement 0 was recorded as a movement, the learner now rests": (
         *(ReplayError, lambda: observation(QUIET, 6, correspondence=last_posture)),

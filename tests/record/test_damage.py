@@ -5,8 +5,9 @@ import shutil
 import numpy as np
 import pytest
 
-from records import fill, read
+from records import DIMS, fill, read
 from runs import edit
+from sgimd_torch import __version__
 from sgimd_torch.record import Record, RunError, layout
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.spaces import stream
@@ -121,6 +122,17 @@ def test_damage_is_told_with_its_row_only_where_it_is_read(tmp_path):
         for table, message in (("errors", "row 3 of errors is not what"), ("regions", "has 7 rows, 12 were written")):
             with pytest.raises(RunError, match=rf"run.sqlite: .*{message}.*sqlite3 run.sqlite .recover"):
                 list(record.rows(table))
+
+
+@pytest.mark.parametrize(
+    ("wrote", "message"), [("0.1.0", ": sgimd_torch 0.1.0 wrote it, and can"), (__version__, "; was it damaged")]
+)
+def test_a_record_of_another_version_is_not_taken_for_damage(tmp_path, wrote, message):
+    path = tmp_path / "run.sqlite"
+    Record.make(path, DIMS, {"versions": {"sgimd_torch": wrote}}).close()
+    edit(path, "ALTER TABLE evaluations DROP COLUMN expected_error")
+    with pytest.raises(RunError, match=rf"its tables are not those of sgimd_torch {__version__}{message}"):
+        Record(path)
 
 
 def test_the_file_of_another_seed_is_told_by_its_folder(tmp_path, go, undisturbed, capsys):

@@ -52,6 +52,8 @@ class Slipping(PlanarArm):
     def execute(self, context, theta, rng):
         self.made += 1
         return super().execute(context, theta if self.made <= 150 else 1 - theta[::-1] ** 2, rng)
+    def trace(self, context, theta, rng):
+        return super().trace(context, theta, rng)
 
 def task(arm):
     return Task(arm, lambda: Benchmark(type(arm).__name__, np.array([[0.0, 0.6], [0.3, -0.5], [-0.4, 0.4]]), 0.1))

@@ -1,8 +1,11 @@
 """Where a user's own part is written: kept with the run, told when it has changed, found by every process."""
 
 import os
+import re
 import subprocess
 import sys
+
+import pytest
 
 from runs import ROOT, about_of, content_of
 from sgimd_torch import PlanarArm
@@ -12,6 +15,8 @@ from sgimd_torch.options.config import Config
 from sgimd_torch.runs.directory import sources
 from sgimd_torch.runs.read import finished
 from sgimd_torch.runs.signals import command
+from sgimd_torch.views import ask
+from sgimd_torch.views.film import command as film
 
 SHORT = (
     "--environment sliders:Slider --algorithm random --movements 40 --evaluate-at 20 --repeats 0 --inverse linear --out"
@@ -45,6 +50,19 @@ def test_the_file_of_every_part_of_ones_own_is_kept_and_told_when_it_has_changed
     assert [each["source of sliders:Slider"] for each in before] == [kept]
     sys.modules.pop("answers")
     assert sources(Config(), PlanarArm()) == {}
+
+
+@pytest.mark.parametrize("view", [ask, film])
+def test_a_view_that_builds_the_robot_again_says_that_its_file_has_changed(own, capsys, view):
+    assert command(main, OWN) == 0
+    words = ["runs/random/seed-000", "--trust", f"--goal{'s' * (view is film)}=0.4"]
+    assert command(view.main, words) == 0
+    assert "is not what it was" not in capsys.readouterr().err
+    with (own / "sliders.py").open("a") as file:
+        file.write("\n# another remark\n")
+    assert command(view.main, words) == 0
+    said = r"of runs/random/seed-000 is not what it was, and moves as it is now: source of sliders:Slider .* ->"
+    assert re.search(said, capsys.readouterr().err)
 
 
 def test_a_robot_that_has_become_another_one_is_refused(own, capsys):

@@ -1,6 +1,10 @@
 """``sgimd ask``: the answers of a run, as its learner gives them, in lines or in tables."""
 
 import csv
+import math
+import re
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -38,15 +42,17 @@ def table_of(file):
 
 def test_a_goal_is_answered_in_a_line_and_executed_if_wanted(path, lived, capsys):
     assert command(main, [str(path), "--goal", "0.3,0.4", "--execute"]) == 0
-    said = dict(part.split(" ") for part in capsys.readouterr().out.strip().split("; "))
+    said = dict(part.removesuffix(" m").split(" ") for part in capsys.readouterr().out.strip().split("; "))
     estimate = lived.inverse(np.zeros(0), np.array([0.3, 0.4]))
-    theta = estimate.theta
+    theta, goal = estimate.theta, [0.3, 0.4]
     assert [float(x) for x in said["expected"].split(",")] == pytest.approx(estimate.expected, rel=1e-3)
+    assert float(said["expected_distance"]) == pytest.approx(math.dist(estimate.expected, goal), rel=1e-3)
     assert float(said["expected_deviation"]) == pytest.approx(estimate.expected_deviation, rel=1e-3)
     assert [float(x) for x in said["theta"].split(",")] == pytest.approx(theta, abs=1e-3)
     reached = PlanarArm(7).execute(np.zeros(0), theta, np.random.default_rng(0))  # an arm without noise
     assert [float(x) for x in said["reached"].split(",")] == pytest.approx(reached, abs=1e-3)
-    assert np.linalg.norm(reached - [0.3, 0.4]) < 0.3
+    assert float(said["error"]) == pytest.approx(math.dist(reached, goal), rel=1e-3)
+    assert float(said["error"]) < 0.3
 
 
 def test_many_goals_go_in_and_out_as_tables_whose_numbers_are_exact(path, lived, tmp_path, capsys):
@@ -60,6 +66,46 @@ def test_many_goals_go_in_and_out_as_tables_whose_numbers_are_exact(path, lived,
         assert [float(row[f"theta_{k}"]) for k in range(7)] == estimate.theta.tolist()
         assert [float(row[f"expected_{k}"]) for k in range(2)] == estimate.expected.tolist()
         assert float(row["expected_deviation"]) == estimate.expected_deviation
+
+
+def test_a_distance_is_told_with_its_unit(path, capsys):
+    assert command(main, [str(path), "--goal", "1,1"]) == 0  # beyond the reach of 1 m
+    said = capsys.readouterr().out
+    away = re.search(r"; expected_distance (\S+) m; expected_deviation \S+ m\n", said)
+    assert float(away[1]) == pytest.approx(math.sqrt(2) - 1, abs=0.05)
+
+
+ROBOT = """
+import os
+import numpy as np
+from sgimd_torch import PlanarArm
+
+class Arm(PlanarArm):
+    habit = None
+
+    def execute(self, context, theta, rng):
+        return {"nan": lambda: np.array([np.nan, 0]), "three": lambda: np.zeros(3), "exits": lambda: exit(0),
+                "raises": lambda: {}["jam"], "masked": lambda: np.ma.masked_array([0, 1], [1, 0]),
+                None: lambda: super(Arm, self).execute(context, theta, rng)}[self.habit]()
+"""
+LOST = {"nan": "must be finite", "three": "must have shape (..., 2)", "exits": "SystemExit: 0", "raises": "KeyError"}
+
+
+@pytest.mark.parametrize(("habit", "reason"), [*LOST.items(), ("masked", "a masked array")])
+def test_an_answer_that_the_robot_cannot_execute_has_failed_as_in_a_run(module, capsys, monkeypatch, habit, reason):
+    module("lost", ROBOT)
+    run_main(["--environment=lost:Arm", "--algorithm=random", "--movements=20", "--evaluate-at=[]", "--out=runs"])
+    monkeypatch.setattr(sys.modules["lost"].Arm, "habit", habit)
+    asked = ["runs/random/seed-000", "--trust", "--goal", "0.3,0.4", "--execute"]
+    assert command(main, asked) == 1
+    said = capsys.readouterr()
+    assert "error: 1 of 1 movements failed, the first for goal 0.3,0.4: " in said.err
+    assert reason in said.err
+    assert "Traceback" not in said.err
+    assert said.out.splitlines()[-1].startswith("goal 0.3,0.4; theta ")
+    assert "reached" not in said.out
+    assert command(main, [*asked, "--goal", "0.1,0.2", "--out", "out.csv"]) == 1
+    assert [row["reached_0"] + row["error"] for row in table_of(Path("out.csv"))] == ["", ""]
 
 
 def test_the_joints_over_time_are_those_of_the_primitive(tmp_path, capsys):

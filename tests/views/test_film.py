@@ -289,6 +289,46 @@ def test_a_robot_from_a_file_is_filmed_in_space_and_without_opengl_in_the_plane(
     assert np.abs(frames["egl"][0, :, :640] - frames["bogus"][0, :, :640]).mean() > 50
 
 
+CONTRAST = """
+import sys
+import numpy as np
+from sgimd_torch.environments.mujoco_robot import MujocoRobot
+from sgimd_torch.spaces import stream
+from sgimd_torch.views.film.model_camera import ModelCamera
+from sgimd_torch.views.film.reel import Shot
+
+for path in sys.argv[1:]:
+    robot = MujocoRobot(path, outcome="site:tip:xy", low=(-0.4, -0.4), high=(0.4, 0.4))
+    shot = Shot(robot.trace([], robot.policies.sample(stream(0, "theta")), stream(0, "noise")), np.array([0.3, 0.3]))
+    with ModelCamera(robot, [shot]) as camera:
+        frame, renderer = np.asarray(camera.frame(shot, 0.5)).mean(axis=2), camera._renderer
+        renderer.update_scene(camera._data, camera=camera._camera)
+        renderer.enable_segmentation_rendering()
+        arm = renderer.render()[..., 0] == robot.model.geom("arm").id
+    around = ~arm & (np.hypot(*np.gradient(frame)) < 1)  # no lines and no edges
+    print(arm.sum(), np.median(frame[arm]) - np.median(frame[around]))
+"""
+ARM_OF_GREY = """<mujoco><worldbody>{}<body><joint name='turn' axis='0 0 1' range='-120 120'/><geom name='arm'
+  type='capsule' fromto='0 0 0 .3 0 0' size='.03' rgba='{} {} {} 1'/><site name='tip' pos='.3 0 0'/></body></worldbody>
+  <actuator><position joint='turn' kp='20' kv='4'/></actuator></mujoco>"""
+
+
+def test_an_arm_of_any_brightness_stands_out_from_what_is_behind_it(tmp_path):
+    paths = []
+    for around in ("", "<geom type='plane' size='.1 .1 .1'/>", "<light pos='0 0 2'/>"):
+        for grey in (0.05, 0.6, 1.0):
+            paths.append(tmp_path / f"{len(paths)}.xml")
+            paths[-1].write_text(ARM_OF_GREY.format(around, grey, grey, grey))
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "MUJOCO_GL": "egl"}
+    done = subprocess.run([sys.executable, "-c", CONTRAST, *paths], env=environment, capture_output=True, text=True)
+    if "MuJoCo finds no OpenGL" in done.stderr:  # a machine without EGL
+        return
+    assert done.returncode == 0, done.stderr
+    pixels, differences = np.loadtxt(done.stdout.splitlines()).T
+    assert pixels.min() > 1000
+    assert np.abs(differences).min() > 50, differences  # of 255
+
+
 @pytest.mark.parametrize("own_camera", ["", "<camera name='far' pos='0 0 3' fovy='40'/>"])
 def test_the_camera_sees_all_of_the_task_space_and_the_arm(own, own_camera):
     near = "<camera name='near' pos='0 0 .5'/>"

@@ -36,6 +36,7 @@ def place(tmp_path_factory):
         "mixed": "Slider2 --movements 40 --evaluate-at 20",
         "mixed --name other": "Slider2 --movements 50 --evaluate-at 30",
         "pictures --name NoPicture": "NoPicture --movements 20 --evaluate-at []",
+        "pictures --name OtherMovement": "OtherMovement --movements 20 --evaluate-at []",
         "pictures --name WrongPicture": "WrongPicture --movements 20 --evaluate-at []",
     }
     for out, words in runs.items():

@@ -21,7 +21,7 @@ from sgimd_torch.views.report import command as report
 from sgimd_torch.views.report import figures, provenance
 from sgimd_torch.views.report.command import page
 from sgimd_torch.views.statistics import interquartile_mean
-from sgimd_torch.views.variants import Variant
+from sgimd_torch.views.variants import Variant, best_first
 
 FIGURES = [f"{what} of SGIM-D" for what in ("Error curve", "Landing points", "Misses", "Expected misses", "Regions")]
 ODD = "<b>&'$x\" "
@@ -239,6 +239,35 @@ def test_variants_of_one_algorithm_have_colours_of_their_own_whatever_their_resu
     assert figures.colours_of([Variant(name, [run]) for name in names[::-1]]) == colours
     assert figures.colours_of([Variant("b", [run])]) == {"b": COLOURS["sgim-d"]}
     assert len(figures.colours_of([Variant(str(k), [run]) for k in range(30)])) == 30
+
+
+def test_eight_curves_of_one_figure_have_eight_colours(run):
+    variants = [Variant(f"{7 * k % 12:02}", [run]) for k in range(12)]  # in another order than their names
+    colours = figures.colours_of(variants)
+    figure = Figure()
+    figures.error_curves(figure, variants[: figures.MOST_CURVES], colours)
+    assert len({line.get_color() for line in figure.axes[0].lines}) == 8
+
+
+def in_unit(run, unit, factor):
+    space = run.spaces["outcomes"]
+    box = replace(space, low=factor * space.low, high=factor * space.high, unit=unit)
+    variant = made(run, unit, factor * np.array(FIVE))
+    return Variant(unit, [replace(one, spaces={**one.spaces, "outcomes": box}) for one in variant.runs])
+
+
+def test_errors_in_different_units_have_axes_of_their_own_and_no_verdict(run, tmp_path):
+    variants = best_first([in_unit(run, "mm", 1e3), in_unit(run, "m", 1), made(run, "worse", [1.0] * 5)])
+    assert [variant.name for variant in variants] == ["m", "worse", "mm"]
+    figure = Figure()
+    figures.error_curves(figure, variants, figures.colours_of(variants))
+    heads = [ax.get_ylabel() for ax in figure.axes]
+    assert heads == [f"mean distance to benchmark goals ({unit})" for unit in ("m", "mm")]
+    assert [len(ax.lines) for ax in figure.axes] == [2, 1]
+    text = page(tmp_path, variants)
+    assert [row[0] for row in rows_of(text, "Last errors minus those of m")[1:]] == ["worse"]
+    assert "Errors have different units, so they cannot be compared: m, worse in m; mm in mm." in text
+    assert "Errors lie between" not in text
 
 
 def test_differences_are_those_to_the_baseline_that_was_chosen(runs, pages, tmp_path):

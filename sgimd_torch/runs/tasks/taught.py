@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from sgimd_torch.demonstrations import load_demonstrations
-from sgimd_torch.demonstrations.fit import misfit_of
+from sgimd_torch.demonstrations.fit import misfit_of, slow_clock
 from sgimd_torch.environments.protocol import Translating, primitive_of
 from sgimd_torch.files import checksum
 from sgimd_torch.learner import Correspondence
@@ -51,6 +51,7 @@ def demonstrations_of(task: Task, file: Path | None) -> tuple[Sequence[Demonstra
     else:
         crc32, demonstrations = None, source()
     notes = [f"{len(demonstrations)} demonstrations"] if demonstrations else []
+    notes += [f"recording {row} {said}" for row, shown in enumerate(demonstrations) for said in slow_clock(shown)][:1]
     outside = [row for row, shown in enumerate(demonstrations) if not robot.outcomes.contains(shown.outcome)]
     if outside:
         unit = robot.outcomes.unit or "the unit of T"

@@ -26,6 +26,7 @@ from typing import Any
 import numpy as np
 from tqdm import tqdm
 
+from sgimd_torch.environments.protocol import beside_execute
 from sgimd_torch.environments.sketch import Sketch, traced
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.figures.names import colour, label
@@ -54,10 +55,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     options = _options(argv)
     run = _opened(options.run, trust=options.trust)
     recorded, parts = run.recorded, run.parts
-    if getattr(parts.environment, "trace", None) is None:
+    if not beside_execute(parts.environment, "trace"):
         raise ValueError(
             f"{recorded.path} is of {recorded.config['environment']}, which cannot be filmed: it needs a method "
-            "trace(context, theta, rng) -> Sketch"
+            "trace(context, theta, rng) -> Sketch, in the class that has its execute()"
         )
     if options.goals is None:
         known = np.unique(parts.benchmark.goals, axis=0)

@@ -2,7 +2,8 @@
 
     with ModelCamera(robot, shots) as camera: write_film(Path("film.mp4"), shoot(camera, shots))
 The model's own camera is used if it is fixed to the world and sees all of T. Else a camera is placed where it does. A
-model without a floor or a light gets them, because shadows on a floor show how far away things are.
+model without a floor or a light gets them, because shadows on a floor show how far away things are. The floor is light
+or dark, whichever differs more from the robot.
 """
 
 from __future__ import annotations
@@ -18,13 +19,13 @@ from PIL import Image
 
 from sgimd_torch.environments.mujoco_robot import Filmed, MujocoRobot
 from sgimd_torch.spaces import Array
-from sgimd_torch.views.film.camera import GOAL, MOST_PAST, MujocoPainter, add_geom, draw_chain
+from sgimd_torch.views.film.camera import GOAL, MOST_PAST, Colour, MujocoPainter, add_geom, draw_chain
 from sgimd_torch.views.film.reel import HEIGHT, WIDTH, Shot
 
 FILLED: Final = 0.8  # share of the picture, in height and width, that shows robot and T
-BORDER: Final = (0.2, 0.5, 0.6, 1.0)  # colour of the border of T
-PATH: Final = (0.88, 0.54, 0.33, 1.0)  # colour of the paths of measured places
-FLOOR: Final = (0.55, 0.6, 0.66, 1.0)  # colour of the floor of a model without one
+BORDER: Final = (0.08, 0.28, 0.36, 1.0)  # colour of the border of T
+PATH: Final = (0.65, 0.32, 0.13, 1.0)  # colour of the paths of measured places
+FLOORS: Final = ((0.66, 0.71, 0.76, 1.0), (0.16, 0.22, 0.3, 1.0))  # colours of a floor that we add, light and dark
 REACHED: Final = (0.8, 0.2, 0.6, 1.0)  # colour of past outcomes, unlike that of anything else
 END: Final = (0.82, 0.2, 0.12, 1.0)  # colour of the measured places
 BALL: Final = mujoco.mjtGeom.mjGEOM_SPHERE
@@ -53,6 +54,9 @@ class ModelCamera(MujocoPainter):
         self._at(_filmed(shots[0]).states[0])
         low = (self._data.geom_xpos[:, 2] - self._model.geom_rbound)[self._model.geom_rbound > 0]
         self._ground = np.append(seen.mean(axis=0)[:2], min(seen[:, 2].min(), low.min(initial=np.inf)))
+        self._ground[2] -= 0.002 * self._far  # below a plane of the model
+        self._floor: Colour | None = None
+        self._floor = self._contrasting_floor()
 
     def frame(self, shot: Shot, time: float) -> Image.Image:
         """The scene at ``time`` (s); after the end of the movement, the last state and the outcome.
@@ -70,7 +74,8 @@ class ModelCamera(MujocoPainter):
         for place in self._robot.located(shot.past[:: max(1, math.ceil(len(shot.past) / MOST_PAST))], start).reshape(
             -1, 3
         ):
-            add_geom(scene, BALL, (size / 2, 0, 0), place, REACHED).emission = 0.5
+            ball = add_geom(scene, BALL, (size / 2, 0, 0), place, REACHED)
+            ball.emission, ball.category = 0.5, mujoco.mjtCatBit.mjCAT_DECOR
         for k, goal in enumerate(self._robot.located(shot.goal[None], start)[0]):
             path = recording.path[: row + 1, k]
             draw_chain(scene, path, 0, PATH)
@@ -80,11 +85,24 @@ class ModelCamera(MujocoPainter):
                 draw_chain(scene, [goal, path[-1]], 0.4 * size, GOAL)
         return Image.fromarray(self._renderer.render())
 
+    def _contrasting_floor(self) -> Colour:
+        """The one of ``FLOORS`` that differs more from the robot, as the camera sees it without a floor."""
+        self._renderer.update_scene(self._data, camera=self._camera)
+        self._furnish(self._renderer.scene)
+        seen = self._renderer.render()
+        self._renderer.enable_segmentation_rendering()
+        geoms, kinds = np.moveaxis(self._renderer.render(), -1, 0)
+        self._renderer.disable_segmentation_rendering()
+        robot = (kinds == mujoco.mjtObj.mjOBJ_GEOM) & np.isin(self._model.geom_bodyid[geoms], self._robot.bodies)
+        brightness = seen[robot].mean() / 255 if robot.any() else 0.0
+        return max(FLOORS, key=lambda floor: abs(brightness - sum(floor[:3]) / 3))
+
     def _furnish(self, scene: mujoco.MjvScene) -> None:
-        """Add a floor, and a light with shadows, if the model has none."""
+        """Add a floor where nothing is behind the robot, and a light with shadows, if the model has none."""
         model, far = self._model, self._far
-        if not (model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE).any():
-            add_geom(scene, mujoco.mjtGeom.mjGEOM_PLANE, (9 * far, 9 * far, 1), self._ground, FLOOR)
+        endless = (model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE) & (model.geom_size[:, :2] == 0).all(axis=1)
+        if self._floor and not endless.any() and mujoco.mjtTexture.mjTEXTURE_SKYBOX not in model.tex_type:
+            add_geom(scene, mujoco.mjtGeom.mjGEOM_PLANE, (9 * far, 9 * far, 1), self._ground, self._floor)
         if not model.nlight:
             light = scene.lights[scene.nlight]
             light.pos[:], light.dir[:] = self._ground + np.array([far, -far, 4 * far]), (-0.24, 0.24, -0.94)

@@ -62,34 +62,38 @@ def png(draw: Callable[Concatenate[Figure, P], None]) -> Callable[P, str]:
 def colours_of(variants: Sequence[Variant]) -> dict[str, str]:
     """Colours by name of the variant: one variant of each algorithm has the algorithm's colour, others have new ones.
 
-    The algorithm's colour goes to the variant named like the algorithm, or else to the first variant by name.
+    The algorithm's colour goes to the variant named like the algorithm, or else to the first variant by name. The first
+    ``MOST_CURVES`` variants, whose curves share a figure, have different colours.
     """
     ordered = sorted(variants, key=lambda variant: (variant.name != variant.algorithm, variant.name))
     firsts = {variant.algorithm: variant.name for variant in reversed(ordered)}
     colour_of = {name: COLOURS[algorithm] for algorithm, name in firsts.items() if algorithm in COLOURS}
     free = [colour for colour in _FURTHER if colour not in colour_of.values()]
     others = [variant.name for variant in ordered if variant.name not in colour_of]
-    return colour_of | {name: free[k % len(free)] for k, name in enumerate(others)}
+    colour_of |= {name: free[k % len(free)] for k, name in enumerate(others)}
+    return colour_of | (colours_of(variants[:MOST_CURVES]) if len(variants) > MOST_CURVES else {})
 
 
 def error_curves(figure: Figure, variants: Sequence[Variant], colours: Mapping[str, str]) -> None:
     """Error against movements: interquartile means over seeds with intervals, or points if there are too few seeds.
 
-    A figure of a single variant also shows the noise floor, and a thin line for each seed.
+    Variants whose errors have different units have axes of their own. A figure of a single variant also shows the noise
+    floor, and a thin line for each seed.
     """
+    units = list(dict.fromkeys(variant.space.unit for variant in variants))
     if len(variants) > 1:
-        figure.set_size_inches(6.8, 4.5)
-    ax = figure.subplots()
-    draw_curves(ax, variants, colours)
+        figure.set_size_inches(6.8, 4.5 * len(units))
+    for ax, unit in zip(figure.subplots(len(units), squeeze=False).flat, units, strict=True):
+        draw_curves(ax, [variant for variant in variants if variant.space.unit == unit], colours)
     if len(variants) == 1:
         (variant,) = variants
         if len(variant.used) > 1:
             ax.plot(variant.evaluated_at, variant.errors.T, color=colours[variant.name], linewidth=0.7, alpha=0.4)
         floor = variant.floors.mean(axis=0)
         ax.plot(variant.evaluated_at, floor, "_--", color="black", linewidth=1.2, markersize=8, label="noise floor")
-    ax.set_ylim(bottom=0)
-    handles = [line for line in ax.lines if not str(line.get_label()).startswith("_")]
-    ax.legend(handles=handles, **LEGEND)
+    for ax in figure.axes:
+        ax.set_ylim(bottom=0)
+        ax.legend(**LEGEND)
 
 
 def draw_curves(ax: Axes, variants: Sequence[Variant], colours: Mapping[str, str]) -> None:

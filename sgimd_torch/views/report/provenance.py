@@ -12,7 +12,7 @@ from typing import Final
 from sgimd_torch.runs.read import Run
 from sgimd_torch.runs.signals import printable
 from sgimd_torch.views.statistics import LEAST_SEEDS
-from sgimd_torch.views.variants import Variant, differing, text_of
+from sgimd_torch.views.variants import Variant, differing, text_of, unalike
 
 AGAIN: Final = "runs/again"  # folder for the repeated runs
 
@@ -23,6 +23,7 @@ def warnings(variants: Sequence[Variant]) -> Iterator[str]:
     few = [f"{variant.label} ({len(variant.used)})" for variant in variants if 0 < len(variant.used) < LEAST_SEEDS]
     if few and len(every) > 1:
         yield f"Fewer than {LEAST_SEEDS} seeds: {', '.join(few)}. They have points, but no intervals and no verdict."
+    yield from (f"{line}." for line in unalike(variants))
     if len({run.files.get("benchmark_crc32") for run in every}) > 1:
         yield "The runs were evaluated on different benchmarks, so their errors cannot be compared."
     for name, values in versions(variants).items():
@@ -37,7 +38,7 @@ def warnings(variants: Sequence[Variant]) -> Iterator[str]:
     if len(lasts) > 1:
         yield f"The last errors belong to different numbers of movements: {', '.join(map(str, lasts))}."
     for run in every:
-        yield from (f"{run.path}: {change}." for change in run.changes)
+        yield from (f"{run.path}: {remark}.".replace("?.", "?") for remark in (*run.changes, *run.remarks))
     cut = [run for run in every if not run.summary["finished"]]
     if cut:
         named = [f"{run.path}: {len(run.index)} of {run.config['movements']} movements" for run in cut]
