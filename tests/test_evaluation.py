@@ -22,7 +22,7 @@ from sgimd_torch.evaluation import (
 )
 from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.parts import Inverse
-from sgimd_torch.runs.evaluations import expected_error, goals_reached
+from sgimd_torch.runs.until import expected_error, goals_reached
 from sgimd_torch.spaces import Array, Box, Estimate, stream
 from worlds import NO_CONTEXT, executed, problem
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import inspect
 from abc import ABC
 from collections.abc import Callable
+from functools import partial
 from typing import Any, Self
-
-from sgimd_torch.options.catalogue import function_of, place_of
 
 
 class Built(ABC):  # noqa: B024
@@ -25,6 +24,8 @@ class Built(ABC):  # noqa: B024
         if isinstance(make, cls) or not callable(make):
             got = f"a {'finished ' * isinstance(make, cls)}{type(make).__name__}"
             if isinstance(make, str):
+                from sgimd_torch.options.catalogue import place_of  # learning needs no names
+
                 got = f"{make!r}; import {place_of(kind.lower(), make).partition(':')[2]}"
             raise ValueError(f"{kind} must be a class or a function, got {got}")
         name = function_of(make).__name__
@@ -51,3 +52,8 @@ def call_checked(what: str, make: Callable[..., Any], *arguments: Any, **options
         return make(*arguments, **options)
     except SystemExit as end:  # SystemExit would end the command, which would look successful
         raise ValueError(f"{what} cannot be made: it calls exit({end})") from end
+
+
+def function_of(make: Callable[..., Any]) -> Callable[..., Any]:
+    """The function or class inside of any ``partial``."""
+    return function_of(make.func) if isinstance(make, partial) else make

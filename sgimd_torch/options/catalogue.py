@@ -14,9 +14,11 @@ import re
 import sys
 from collections.abc import Callable, Collection, Iterable
 from difflib import get_close_matches
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from typing import Any, Final
+
+from sgimd_torch.options.built import function_of
 
 ROD: Final = "fishing-rod"
 _TABLE: Final = """
@@ -157,11 +159,6 @@ def about(kind: str, word: str) -> str:
     begin = rf"^(?:(?:class|def) {name}\b|{name} = )" if name else r"\A"
     described = re.search(begin + r'.*?"""(.*?)\.?(?:"""|\n)', source, re.DOTALL | re.MULTILINE)
     return described[1] if described else ""
-
-
-def function_of(make: Callable[..., Any]) -> Callable[..., Any]:
-    """The function or class inside of any ``partial``."""
-    return function_of(make.func) if isinstance(make, partial) else make
 
 
 def unknown_name_error(what: str, word: str, known: Collection[str], also: str = "") -> ValueError:

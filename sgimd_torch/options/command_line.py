@@ -14,7 +14,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from sgimd_torch.options.config import Config
-from sgimd_torch.options.help import help_on, overview
 from sgimd_torch.runs.signals import Stopping, loading
 
 
@@ -43,6 +42,8 @@ def parse(argv: Sequence[str], description: str | None = None) -> tuple[Config, 
     try:
         texts, flags = _read(argv)
         if "help" in flags:
+            from sgimd_torch.options.help import help_on, overview  # runs need no help
+
             print(help_on(texts) if texts else overview(description))
             raise SystemExit(0)
         return Config.from_settings(texts), "resume" in flags

@@ -17,7 +17,7 @@ from functools import cache, wraps
 from pathlib import Path
 from typing import Any, Final, NamedTuple, TypeVar, cast
 
-from sgimd_torch.options.catalogue import WORDS, function_of
+from sgimd_torch.options.built import function_of
 
 F = TypeVar("F", bound=Callable[..., Any])
 _EMPTY: Final = inspect.Parameter.empty
@@ -114,6 +114,8 @@ def with_keywords_of(target: Callable[..., Any], *names: str, **changed: Any) ->
 
 def _kind(parameter: inspect.Parameter) -> Any:
     """Kind of the part that a parameter chooses, or its type if this is simple; None for other parameters."""
+    from sgimd_torch.options.catalogue import WORDS  # learning needs no names
+
     kind = parameter.annotation
     if parameter.name in WORDS and callable(parameter.default):
         return parameter.name

@@ -21,7 +21,7 @@ from sgimd_torch.learner.events import Event, Kind
 from sgimd_torch.options.build import RunParts, task_of
 from sgimd_torch.record import ReplayError, Row, RunError
 from sgimd_torch.runs.directory import open_run
-from sgimd_torch.runs.evaluations import Evaluations, ends_now
+from sgimd_torch.runs.evaluations import Evaluations
 from sgimd_torch.runs.signals import Failed, Progress, Stopped, Stopping, say
 from sgimd_torch.session import Execute, NoOutcomeError, live, run
 from sgimd_torch.spaces import Episode
@@ -285,6 +285,8 @@ class RunLoop:
         config = self.parts.config
         if config.until is None or self.replaying or not self._all_told or self.movements >= config.movements:
             return False
+        from sgimd_torch.runs.until import ends_now  # few runs end early
+
         with self.seconds.of("evaluation"):
             ends = ends_now(self.parts, self.record, self.movements, self.evaluations.between)
         if ends and config.evaluations:
