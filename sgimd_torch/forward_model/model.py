@@ -27,7 +27,7 @@ from sgimd_torch.forward_model.networks import (
 )
 from sgimd_torch.forward_model.training import Fit, OnlineTrainer, one_thread
 from sgimd_torch.memory import Memory
-from sgimd_torch.options.built import function_of
+from sgimd_torch.options import function_of
 from sgimd_torch.spaces import Array, check_count, check_vector, stream
 
 TRUSTED_UP_TO: Final = 0.25  # largest relative error of a model that is used

@@ -17,7 +17,8 @@ from typing import Any, ClassVar, Final, NamedTuple
 
 import torch
 
-from sgimd_torch.options.built import call_checked, function_of
+from sgimd_torch.options import function_of
+from sgimd_torch.options.built import call_checked
 from sgimd_torch.options.catalogue import unknown_name_error
 from sgimd_torch.spaces import check_count
 

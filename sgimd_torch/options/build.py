@@ -16,7 +16,8 @@ from sgimd_torch.environments.protocol import Environment, FromFiles
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
-from sgimd_torch.options.built import call_checked, function_of
+from sgimd_torch.options import function_of
+from sgimd_torch.options.built import call_checked
 from sgimd_torch.options.catalogue import load_word
 from sgimd_torch.options.config import FILES, OWN, Config
 from sgimd_torch.parts import Demonstrator, Inverse, Teacher

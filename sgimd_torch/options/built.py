@@ -5,8 +5,9 @@ from __future__ import annotations
 import inspect
 from abc import ABC
 from collections.abc import Callable
-from functools import partial
 from typing import Any, Self
+
+from sgimd_torch.options import function_of
 
 
 class Built(ABC):  # noqa: B024
@@ -52,8 +53,3 @@ def call_checked(what: str, make: Callable[..., Any], *arguments: Any, **options
         return make(*arguments, **options)
     except SystemExit as end:  # SystemExit would end the command, which would look successful
         raise ValueError(f"{what} cannot be made: it calls exit({end})") from end
-
-
-def function_of(make: Callable[..., Any]) -> Callable[..., Any]:
-    """The function or class inside of any ``partial``."""
-    return function_of(make.func) if isinstance(make, partial) else make

@@ -18,7 +18,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
-from sgimd_torch.options.built import function_of
+from sgimd_torch.options import function_of
 
 ROD: Final = "fishing-rod"
 _TABLE: Final = """

@@ -17,7 +17,7 @@ from functools import cache, wraps
 from pathlib import Path
 from typing import Any, Final, NamedTuple, TypeVar, cast
 
-from sgimd_torch.options.built import function_of
+from sgimd_torch.options import function_of
 
 F = TypeVar("F", bound=Callable[..., Any])
 _EMPTY: Final = inspect.Parameter.empty

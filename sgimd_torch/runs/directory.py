@@ -21,8 +21,8 @@ import numpy as np
 import sgimd_torch
 from sgimd_torch.environments.protocol import Environment, FromFiles
 from sgimd_torch.files import checksum, make_folder
+from sgimd_torch.options import function_of
 from sgimd_torch.options.build import RunParts, build
-from sgimd_torch.options.built import function_of
 from sgimd_torch.options.catalogue import PLACES, WORDS
 from sgimd_torch.options.config import FILES, Config, differ, words
 from sgimd_torch.record import Dims, Record, RunError

@@ -11,7 +11,7 @@ from sgimd_torch import parts
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.goals.uniform import UniformGoals
 from sgimd_torch.inverses.nearest import NearestNeighbour
-from sgimd_torch.options.built import function_of
+from sgimd_torch.options import function_of
 from sgimd_torch.options.catalogue import WORDS
 from sgimd_torch.parts import Goals
 from sgimd_torch.searches.simplex import NelderMead
