@@ -22,7 +22,7 @@ from sgimd_torch.parts import Problem
 from sgimd_torch.spaces import Array
 
 _FEWEST: Final = 16  # least number of movements, the number to which a process is first fitted
-_WORTH: Final = 0.75  # largest share of the error that is told; another fit of the kernel gained up to 15 % (a Jaco arm)
+_WORTH: Final = 0.75  # largest share of the error that is told; another fit of the kernel gained .15 on a Jaco arm
 
 
 @one_thread
