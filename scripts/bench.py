@@ -121,7 +121,7 @@ def live(name: str, movements: int) -> Figures:
 def at_once(movements: int) -> Figures:
     """Movements a second by the clock, with several robots at once."""
     from sgimd_torch import FishingRod, practice, run
-    from sgimd_torch.runs.at_once import executing
+    from sgimd_torch.runs.run import executing
     from sgimd_torch.session import JOINS_EVERY
 
     figures: Figures = {}

@@ -35,7 +35,7 @@ _SLOW: Final = 128  # number of last movements that such a test compares
 _FAILED: Final = 6.0  # squared error, relative to the expected one, above which a prediction has failed
 _TESTED: Final = 128  # largest number of newest movements that are tested
 _ERAS: Final = 3  # largest number of earlier eras that are kept
-SURER: Final = 0.5  # largest variance of the outcome of an earlier exemplar now, relative to its variance without it
+_SURER: Final = 0.5  # largest variance of the outcome of an earlier exemplar now, relative to its variance without it
 _GROWTH: Final = 2  # factor of the length of an era from one comparison with earlier eras to the next
 _FIRST_REVIEW: Final = 8  # number of movements at the first such comparison with a prior
 _ALONE: Final = 24  # least number of movements that get lengths and kernel of their own
@@ -219,7 +219,7 @@ class ChangeDetector:
         correction, variances, _ = of_unexplained.predict(before)
         variances_alone = alone.predict(before)[1] * alone.inflation(tested_rows)
         corrected = before._replace(outcomes=before.outcomes + correction)
-        return corrected.some(variances * of_unexplained.inflation(tested_rows) < SURER * variances_alone)
+        return corrected.some(variances * of_unexplained.inflation(tested_rows) < _SURER * variances_alone)
 
 
 def _fourth_fifth(values: list[float]) -> float:

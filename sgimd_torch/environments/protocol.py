@@ -274,6 +274,18 @@ def check_movement(environment: Environment, context: ArrayLike, theta: ArrayLik
     return context, theta
 
 
+def execute_one(environment: Environment, context: Array, theta: Array, rng: np.random.Generator) -> Array:
+    """Outcome of one movement, checked as in a run.
+
+    Raises:
+        SimulationError: the movement has failed.
+    """
+    (outcome,) = execute_many(environment, [context], [theta], [rng])
+    if isinstance(outcome, Failure):
+        raise SimulationError(outcome.reason)
+    return outcome
+
+
 def check_recording(
     times: ArrayLike, trajectory: ArrayLike, columns: int, *, samples: int = 2, longest: float = np.inf
 ) -> tuple[Array, Array]:

@@ -156,9 +156,10 @@ def _parsed(text: str, kind: Any) -> Any:
         return None if text == "null" and types.NoneType in inner else _parsed(text, inner[0])
     if kind is bool:
         return bool(("false", "true").index(text))
+    # Python would read 1_0 as 10, and the digits of all scripts.
     if (not text and kind is not str) or (kind in (int, float) and ("_" in text or not text.isascii())):
         raise ValueError
-    return kind(text)  # of Python, which would read 1_0 as 10, and the digits of all scripts
+    return kind(text)
 
 
 def as_text(value: Any) -> str:

@@ -10,11 +10,11 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import contextmanager
 from functools import partial
 from typing import Any, Final
 
-from sgimd_torch.environments.protocol import Environment, SimulationError, moves_in_batches, reason_of
+from sgimd_torch.environments.protocol import Environment, SimulationError, reason_of
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.session import Execute, live
 from sgimd_torch.spaces import Array, Failure
@@ -32,22 +32,6 @@ def check_at_once(environment: Environment, at_once: int) -> None:
     most = getattr(environment, "at_once", at_once)  # of the driver of a single robot, for example
     if at_once > most:
         raise ValueError(f"at_once must be at most {most}, the at_once of {type(environment).__name__}, got {at_once}")
-
-
-def executing(
-    environment: Environment, make: Callable[[], Any], seed: int, at_once: int
-) -> AbstractContextManager[Execute]:
-    """The function that executes movements: in this process, or in several if that is faster.
-
-    Args:
-        environment: environment of the movements.
-        make: constructor of the environment.
-        seed: number from which the random streams of the environment come.
-        at_once: number of robots that move at once.
-    """
-    if at_once == 1 or moves_in_batches(environment):
-        return nullcontext(live(environment, seed))
-    return in_processes(make, seed, at_once)
 
 
 @contextmanager

@@ -8,14 +8,14 @@ from __future__ import annotations
 import math
 import time
 import traceback
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Final, Protocol, Self, runtime_checkable
+from typing import Any, Final, Protocol, Self, runtime_checkable
 
-from sgimd_torch.environments.protocol import FAILURES, SimulationError, reason_of
+from sgimd_torch.environments.protocol import FAILURES, Environment, SimulationError, moves_in_batches, reason_of
 from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.learner.events import Event, Kind
 from sgimd_torch.options.build import RunParts, task_of
@@ -163,13 +163,7 @@ class RunLoop:
     def episodes(self) -> Iterator[Episode]:
         """All episodes, one by one: first the recorded ones, then new ones."""
         parts, config = self.parts, self.parts.config
-        executing: AbstractContextManager[Execute] = nullcontext(live(parts.environment, config.seed))
-        if config.at_once > 1:
-            from sgimd_torch.runs import at_once  # most runs have one robot
-
-            make = partial(task_of, config)
-            executing = at_once.executing(parts.environment, make, config.seed, config.at_once)
-        with executing as execute:
+        with executing(parts.environment, partial(task_of, config), config.seed, config.at_once) as execute:
             episodes = run(
                 parts.learner,
                 parts.environment,
@@ -384,3 +378,21 @@ class Seconds:
     def summary(self) -> dict[str, float]:
         """Seconds by name, as the record stores them."""
         return {f"seconds_{part}": round(seconds, 3) for part, seconds in self._spent.items()}
+
+
+def executing(
+    environment: Environment, make: Callable[[], Any], seed: int, at_once: int
+) -> AbstractContextManager[Execute]:
+    """The function that executes movements: in this process, or in several if that is faster.
+
+    Args:
+        environment: environment of the movements.
+        make: constructor of the environment.
+        seed: number from which the random streams of the environment come.
+        at_once: number of robots that move at once.
+    """
+    if at_once == 1 or moves_in_batches(environment):
+        return nullcontext(live(environment, seed))
+    from sgimd_torch.runs.at_once import in_processes  # most runs have one robot
+
+    return in_processes(make, seed, at_once)

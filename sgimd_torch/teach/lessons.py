@@ -15,10 +15,10 @@ from typing import Final
 import numpy as np
 
 from sgimd_torch.demonstrations.fit import beyond_limits, misfit_of
-from sgimd_torch.environments.protocol import SimulationError, execute_many, primitive_of
+from sgimd_torch.environments.protocol import execute_one, primitive_of
 from sgimd_torch.runs.tasks import Task
 from sgimd_torch.runs.tasks.taught import correspondence_of
-from sgimd_torch.spaces import Array, Demonstration, Failure, read_only
+from sgimd_torch.spaces import Array, Demonstration, read_only
 from sgimd_torch.teach.led import HandLed, hand_led_of
 
 FASTER: Final = 1.02  # multiple of the robot's largest speed; a joint that was led faster gets a remark
@@ -62,10 +62,7 @@ def lesson_by_hand(times: Array, joints: Array, task: Task, rng: np.random.Gener
     played = times / times[-1] * longest if times[-1] > longest else times  # the last time equals longest exactly
     theta_d = robot.policies.check("theta_d", correspondence_of(task)(played, joints))
     context = robot.contexts.low + robot.contexts.sides / 2
-    (outcome,) = execute_many(robot, [context], [theta_d], [rng])
-    if isinstance(outcome, Failure):
-        raise SimulationError(outcome.reason)
-    demonstration = Demonstration(context, played, joints, outcome)
+    demonstration = Demonstration(context, played, joints, execute_one(robot, context, theta_d, rng))
     remarks = (*_differences(times, played, joints, led), *beyond_limits(robot, demonstration))
     return HandLesson(demonstration, read_only(theta_d), misfit_of(robot, theta_d, demonstration), remarks)
 

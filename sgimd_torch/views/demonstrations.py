@@ -43,7 +43,7 @@ from sgimd_torch.environments.protocol import (
     Replaying,
     SimulationError,
     beside_execute,
-    execute_many,
+    execute_one,
     primitive_of,
     tried,
 )
@@ -262,9 +262,7 @@ def check(task: Task, demonstration: Demonstration, row: int) -> Checked:
             )
         context = robot.contexts.check("its context", demonstration.context)
         theta = theta_of(task, demonstration)
-        (lands,) = execute_many(robot, [context], [theta], [stream(row, "demonstrations check")])
-        if isinstance(lands, Failure):
-            raise SimulationError(lands.reason)
+        lands = execute_one(robot, context, theta, stream(row, "demonstrations check"))
         if not demonstration.outcome.size:
             outcome = lands
             # A replay has no context.
