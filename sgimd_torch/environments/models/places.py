@@ -147,7 +147,11 @@ def commands_box(model: mujoco.MjModel, joints: Sequence[str]) -> tuple[Box, lis
             raise ValueError(f"joints: {name!r} is no joint with an actuator{hint}")
     chosen, endless = [k for name in joints or moved for k in moved[name]], list[str]()
     if not joints:  # a slide without a range, such as that of a base, stays where it is
-        chosen = [k for k in chosen if model.actuator_ctrllimited[k] or not _slides_on(model, joint_of(model, k))]
+        held = [k for k in chosen if not model.actuator_ctrllimited[k] and _slides_on(model, joint_of(model, k))]
+        chosen = [k for k in chosen if k not in held]
+        names = ", ".join(model.joint(joint_of(model, k)).name for k in held)
+        advice = "write ranges into the model, or command forces: --environment.servos file"
+        remarks += [f"slides without a range stay where they are: {names}; {advice}"] * bool(held)
     for k in chosen:
         joint, side = joint_of(model, k), model.actuator_ctrlrange[k]
         if not model.actuator_ctrllimited[k]:
@@ -166,7 +170,7 @@ def commands_box(model: mujoco.MjModel, joints: Sequence[str]) -> tuple[Box, lis
     if endless:
         remarks.append(f"without a range, so from -pi to pi: {', '.join(endless)}")
     if not chosen:
-        raise ValueError("no actuator moves a joint of the model with a range; write a range into the model")
+        raise ValueError("; ".join(["no actuator moves a joint of the model with a range", *remarks]))
     owners = [joint_of(model, k) for k in chosen]
     names = [model.actuator(k).name if j is None else model.joint(j).name for j, k in zip(owners, chosen, strict=True)]
     low, high = np.array(sides).T
