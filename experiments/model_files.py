@@ -75,7 +75,6 @@ FILES: Final = (
     File("pybullet_data/cartpole.urdf", "body:pole:x"),
     File("dm_control/third_party/kinova/jaco_hand.xml", "body:b_finger_tip_1"),
     File("robosuite/models/assets/grippers/panda_gripper.xml", "body:finger_joint1_tip:y"),
-    File("robosuite/models/assets/grippers/inspire_left_hand.xml", "site:site_l_index_distal:xz"),
     File("robosuite/models/assets/robots/iiwa/robot.xml", "body:right_hand"),
     File("robosuite/models/assets/robots/kinova3/robot.xml", "body:right_hand"),
     File("robosuite/models/assets/robots/sawyer/robot.xml", "body:right_hand"),
@@ -102,6 +101,9 @@ FILES: Final = (
     File("robosuite/models/assets/robots/baxter/robot.xml", "body:right_hand", "miss their commands"),
     File("robosuite/models/assets/robots/gr1/robot.xml", "site:right_center", "holding still"),
     File("robosuite/models/assets/robots/spot/robot.xml", "site:center", "holding still"),
+    File(
+        "robosuite/models/assets/grippers/inspire_left_hand.xml", "site:site_l_index_distal:xz", "miss their commands"
+    ),
     File("robosuite/models/assets/grippers/jaco_three_finger_gripper.xml", "body:thumb_distal", "miss their commands"),
     File("pybullet_data/quadruped/minitaur.urdf", "body:lower_leg_front_rightL_link", "miss their commands"),
     File("pybullet_data/humanoid/humanoid.urdf", "body:right_wrist", "holding still"),

@@ -147,10 +147,10 @@ class MujocoRobot:
         self.model, self.remarks, self.files = loaded.model, loaded.remarks, files_of(path)
         self._longest, self._settle, self._displacement, self.noise = durations[1], settle, displacement, noise
         self._n_steps(self._longest)
-        commands, self._actuators, said = commands_box(self.model, joints)
+        self._home, self._held = self._begin(loaded.start)
+        commands, self._actuators, said = commands_box(self.model, joints, self._held)
         self.remarks += said
         self.joints = positions(self.model, self._actuators)
-        self._home, self._held = self._begin(loaded.start)
         make = controller or partial(
             GaussianPrimitive,
             durations=durations,

@@ -114,6 +114,16 @@ def test_no_movement_exceeds_the_speeds_of_a_urdf(here):
     assert speeds.max() > 2
 
 
+def test_a_joint_with_more_than_a_turn_begins_where_the_file_says_and_reaches_each_posture_once(here):
+    free = ARM.replace('range="-150 150"', "").replace('range="20 150"', 'range="-600 600"')
+    (here / "arm.xml").write_text(free.replace("<actuator>", KEY.replace(".3 .7", "4 10") + "<actuator>"))
+    robot = MujocoRobot("arm.xml", outcome="site:r:tip:x:xz", low=(-1, -1), high=(1, 1))
+    box = robot.primitive.joints
+    assert robot.start == pytest.approx([4, 10])
+    assert box.low == pytest.approx([4 - np.pi, np.deg2rad(600) - 2 * np.pi])
+    assert box.high == pytest.approx([4 + np.pi, np.deg2rad(600)])
+
+
 def test_damping_neither_leaves_a_light_joint_behind_nor_asks_a_motor_for_more_than_it_has(here):
     robot = MujocoRobot("slow.xml", outcome="joint:wheel,joint:light", low=(-2, -2), high=(2, 2))
     theta = np.array([0.5, 0.5, 0.9, 0.9] * 2 + [0.0])
