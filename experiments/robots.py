@@ -123,7 +123,7 @@ def after_change(evidence: Evidence, robot: str, change: str, learner: str, at: 
 
 
 def models(page: Page) -> str:
-    """What came of model files that nobody made for this library, in two sentences."""
+    """What came of model files that nobody made for this library."""
     table = page.evidence.models
     if (ratios := table.dropna(subset="ratio")).empty:
         page.missing.append("model files")
@@ -136,11 +136,12 @@ def models(page: Page) -> str:
         if (words := expected.get((row["file"], row["outcome"], row["options"])))
     )
     packages = dict.fromkeys(f"{row['file'].partition('/')[0]} {row['version']}" for row in rows)
-    counts = [f"{(table['told'] == word).sum()} are {word}" for word in (RIGHT, WARNED, REFUSED)]
+    counts = [f"{(table['told'] == word).sum()} {word}" for word in (RIGHT, WARNED, REFUSED)]
+    mean = np.exp(np.log(ratios["ratio"]).mean())
     return (
-        f"Of {len(rows)} unchanged files of {', '.join(packages)}, {', '.join(counts)}; {right} as a reader expects "
-        f"([rows](model_files.csv)). After 500 movements `practice` errs {np.exp(np.log(ratios['ratio']).mean()):.2f} "
-        f"times as much as random movements in the mean of {len(ratios)}, worse by its interval on "
+        f"`sgimd check` on {len(rows)} places in {table['file'].nunique()} unchanged files of {', '.join(packages)}: "
+        f"{', '.join(counts)}; {right} as reading them tells ([rows](model_files.csv)). After 500 movements `practice` errs "
+        f"{mean:.2f} times as much as random movements in the mean of {len(ratios)}, worse by its interval on "
         f"{(ratios['low'] > 1).sum()}."
     )
 

@@ -102,8 +102,7 @@ def test_model_files_are_counted_by_what_is_told_and_errors_on_them_compared(tmp
     files = [File("dm_control/arm.xml", "site:tip"), File("robosuite/arm.xml", "geom:x", "cannot")]
     monkeypatch.setattr(robots, "FILES", files)
     said = robots.models(Page(found_in(tmp_path), tmp_path))
-    assert said.startswith("Of 2 unchanged files of dm_control 1.0, robosuite 1.5, 1 are right, 0 are warned, 1 are ")
-    assert "refused; 1 as a reader expects" in said
+    assert "2 places in 2 unchanged files of dm_control 1.0, robosuite 1.5: 1 right, 0 warned, 1 refused; 1 as" in said
     assert "errs 0.80 times as much as random movements in the mean of 1, worse by its interval on 0." in said
 
 
