@@ -84,6 +84,7 @@ FILES: Final = (
     File("metaworld/assets/sawyer_xyz/sawyer_reach_v3.xml", "site:endEffector", RIGHT, "--environment.servos=made"),
     File("gymnasium_robotics/envs/assets/fetch/reach.xml", "site:robot0:grip"),
     File("dm_control/suite/manipulator.xml", "site:pinch:xz"),
+    File("pybullet_data/franka_panda/panda.urdf", "body:panda_hand"),
     File("robosuite/models/assets/bullet_data/panda_description/urdf/panda_arm.urdf", "body:panda_link7"),
     File("robosuite/models/assets/bullet_data/sawyer_description/urdf/sawyer_arm.urdf", "body:right_l6"),
     File("dm_control/suite/acrobot.xml", "site:tip:xz", "miss their commands"),

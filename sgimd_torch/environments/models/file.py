@@ -68,7 +68,7 @@ def load_model(path: Path, joints: Sequence[str], servos: str, keyframe: str, po
     with warnings.catch_warnings(record=True) as heard:
         warnings.simplefilter("always")
         loaded = _load(path, joints, servos, keyframe, posture)
-    return loaded._replace(remarks=[*loaded.remarks, *dict.fromkeys(f"MuJoCo warns: {each.message}" for each in heard)])
+    return loaded._replace(remarks=[*loaded.remarks, *dict.fromkeys(f"warning: {each.message}" for each in heard)])
 
 
 def _load(path: Path, joints: Sequence[str], servos: str, keyframe: str, posture: Sequence[float]) -> Loaded:
@@ -92,7 +92,7 @@ def _load(path: Path, joints: Sequence[str], servos: str, keyframe: str, posture
         alone, limits = root.tag == "robot", [(joint, joint.find("limit")) for joint in root.iter("joint")]
         # MuJoCo does not read the speeds of a URDF.
         speeds = {
-            joint.get("name", ""): float(limit.get("velocity", 0)) or np.inf
+            joint.get("name", ""): max(0.0, float(limit.get("velocity", 0))) or np.inf
             for joint, limit in limits
             if limit is not None
         }

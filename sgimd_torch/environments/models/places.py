@@ -150,9 +150,9 @@ def commands_box(model: mujoco.MjModel, joints: Sequence[str], start: Array) -> 
     if not joints:  # a slide without a range, such as that of a base, stays where it is
         held = [k for k in chosen if not model.actuator_ctrllimited[k] and _slides_on(model, joint_of(model, k))]
         chosen = [k for k in chosen if k not in held]
-        names = ", ".join(model.joint(joint_of(model, k)).name for k in held)
+        sliding = ", ".join(model.joint(joint_of(model, k)).name for k in held)
         advice = "write ranges into the model, or command forces: --environment.servos file"
-        remarks += [f"slides without a range stay where they are: {names}; {advice}"] * bool(held)
+        remarks += [f"slides without a range stay where they are: {sliding}; {advice}"] * bool(held)
     for k in chosen:
         joint, side = joint_of(model, k), model.actuator_ctrlrange[k]
         if not model.actuator_ctrllimited[k]:
