@@ -28,11 +28,13 @@ from sgimd_torch.environments.models.places import (
     context_box,
     hand_of,
     holding,
+    joint_of,
     moved_by,
     outcome_places,
     path_to,
     positions,
     pulled,
+    slides_on,
 )
 from sgimd_torch.environments.models.posture import touching
 from sgimd_torch.environments.motor_primitives import GaussianPrimitive
@@ -398,7 +400,9 @@ class MujocoRobot:
             if names:
                 lines.append(f"holding still, the robot touches itself: {listed(names)}; give --environment.keyframe")
             if sunk > SUNK:
-                advice = "" if self.joints else "; its commands are no positions: --environment.servos made holds it"
+                endless = all(slides_on(self.model, joint_of(self.model, k)) for k in self._actuators)
+                advice = "; its commands are no positions: --environment.servos made holds it"
+                advice = "" if self.joints or endless else advice
                 lines.append(f"holding still, what is measured moves by {self.outcomes.amount(sunk, '.2g')}{advice}")
         contexts, thetas = self._drawn("look", LOOKED)
         signs = [stream(0, "signs", k).choice([-1, 1], self.policies.dim) for k in range(LOOKED)]

@@ -95,13 +95,19 @@ def test_an_arm_with_motors_begins_within_its_ranges_holds_still_and_goes_where_
 def test_the_motors_of_the_file_let_it_fall_and_a_remark_says_so(here):
     robot = MujocoRobot("arm.xml", outcome="site:r:tip:x:xz", servos="file", low=(-1, -1), high=(1, 1))
     assert robot.joints == ()
-    assert any("holding still, what is measured moves by" in remark for remark in robot.remarks)
+    (falls,) = (remark for remark in robot.remarks if "holding still, what is measured moves by" in remark)
+    assert falls.endswith("--environment.servos made holds it")
+
+
+def test_what_slides_without_a_range_is_not_said_to_be_held_by_servos(here):
+    (here / "cart.xml").write_text(CART.replace("<worldbody>", '<option gravity="1 0 0"/><worldbody>'))
+    robot = MujocoRobot("cart.xml", outcome="body:cart:x", servos="file", low=(-1,), high=(1,))
+    (falls,) = (remark for remark in robot.remarks if "holding still" in remark)
+    assert "servos" not in falls
 
 
 def test_a_keyframe_named_home_is_the_start(here):
-    (here / "arm.xml").write_text(
-        ARM.replace("<actuator>", '<keyframe><key name="Home" qpos=".3 .7 0"/></keyframe><actuator>')
-    )
+    (here / "arm.xml").write_text(ARM.replace("<actuator>", KEY + "<actuator>"))
     robot = MujocoRobot("arm.xml", outcome="site:r:tip:x:xz", low=(-1, -1), high=(1, 1))
     assert robot.start == pytest.approx([0.3, 0.7])
 

@@ -148,7 +148,7 @@ def commands_box(model: mujoco.MjModel, joints: Sequence[str], start: Array) -> 
             raise ValueError(f"joints: {name!r} is no joint with an actuator{hint}")
     chosen, endless = [k for name in joints or moved for k in moved[name]], list[str]()
     if not joints:  # a slide without a range, such as that of a base, stays where it is
-        held = [k for k in chosen if not model.actuator_ctrllimited[k] and _slides_on(model, joint_of(model, k))]
+        held = [k for k in chosen if not model.actuator_ctrllimited[k] and slides_on(model, joint_of(model, k))]
         chosen = [k for k in chosen if k not in held]
         sliding = ", ".join(model.joint(joint_of(model, k)).name for k in held)
         advice = "write ranges into the model, or command forces: --environment.servos file"
@@ -158,7 +158,7 @@ def commands_box(model: mujoco.MjModel, joints: Sequence[str], start: Array) -> 
         if not model.actuator_ctrllimited[k]:
             if joint is None or not is_servo(model, k):
                 raise ValueError(f"actuator {model.actuator(k).name!r} has no ctrlrange; write one into the model")
-            if _slides_on(model, joint):
+            if slides_on(model, joint):
                 raise ValueError(f"joint {model.joint(joint).name!r} slides without a range; write one into the model")
             side = model.jnt_range[joint] if model.jnt_limited[joint] else np.array([-np.inf, np.inf])
             side = np.sort(side * model.actuator_gear[k, 0])
@@ -183,7 +183,8 @@ def commands_box(model: mujoco.MjModel, joints: Sequence[str], start: Array) -> 
     return Box(low, high, tuple(names)), chosen, remarks
 
 
-def _slides_on(model: mujoco.MjModel, joint: int | None) -> bool:
+def slides_on(model: mujoco.MjModel, joint: int | None) -> bool:
+    """Whether a joint slides without a range."""
     return joint is not None and not model.jnt_limited[joint] and UNITS.get(int(model.jnt_type[joint])) == "m"
 
 
