@@ -47,6 +47,7 @@ class Evidence:
         explored, asked: tables explored.csv and asked.csv, with the index variant and seed.
         random: table random.csv.
         changes: table changes.csv with the index robot, change, learner, movements and seed.
+        models: table model_files.csv.
     """
 
     rows: pd.DataFrame
@@ -54,6 +55,7 @@ class Evidence:
     asked: pd.DataFrame
     random: pd.DataFrame
     changes: pd.DataFrame
+    models: pd.DataFrame
 
     @classmethod
     def of(cls, folder: Path) -> Evidence:
@@ -67,7 +69,8 @@ class Evidence:
         explored, asked = (read_table(folder, name).set_index("variant") for name in ("explored.csv", "asked.csv"))
         after = ["robot", "change", "learner", "movements", "seed"]
         changes = read_table(folder, "changes.csv").set_index(after).sort_index()
-        return cls(rows, explored, asked, read_table(folder, "random.csv"), changes)
+        random, models = (read_table(folder, name) for name in ("random.csv", "model_files.csv"))
+        return cls(rows, explored, asked, random, changes, models)
 
     def at(self, name: str, movements: int = LAST, column: str = "error") -> pd.Series:
         """Errors (m) by seed after a number of movements; noise floors (m) if the column is "floor"."""

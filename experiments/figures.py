@@ -9,6 +9,7 @@
   kinds       error over that of random movements, by family and by noise            (ANY_ROBOT)
   changes     error after a change, divided by the error of starting anew             (CHANGES)
   simulator   error on a real arm, begun with a simulator or with nothing             (CHANGES)
+  models      error of practice over that of random movements, by model file          (ANY_ROBOT)
 
 Points are interquartile means over seeds, with 95 % intervals. If a figure has no data, a message says so.
 
@@ -90,8 +91,23 @@ def curiosity(evidence: Evidence) -> Figure:
     return figure
 
 
+def models(evidence: Evidence) -> Figure:
+    """The error of practice divided by that of random movements, on each model file that is told to be right."""
+    rows = evidence.models.dropna(subset="ratio").sort_values("ratio").to_dict("records")
+    numbers = {
+        f"{row['file'].partition('/')[0]} {Path(row['file']).parent.name}/{Path(row['file']).name} {row['outcome']}": (
+            partial(Interval, row["ratio"], row["low"], row["high"])
+        )
+        for row in rows
+    }
+    figure = _rows(numbers, "error of practice / of random movements, after 500", form=".2f")
+    (ax,) = figure.axes
+    ax.axvline(1, color="black", linewidth=1, zorder=0)
+    return figure
+
+
 FIGURES: Final[dict[str, Callable[[Evidence], Figure]]] = {
-    **{figure.__name__: figure for figure in (learning, paper, gain, curiosity)},
+    **{figure.__name__: figure for figure in (learning, paper, gain, curiosity, models)},
     **OF_ROBOTS,
 }
 

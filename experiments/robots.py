@@ -1,4 +1,4 @@
-"""Robots that nobody tuned on, and robots that change: statistics and claims from random.csv and changes.csv.
+"""Robots that nobody tuned on, and robots that change: statistics and claims from their tables of results.
 
     harmful(evidence, "practice", 250); judge(any_robot(evidence)); judge(changes(evidence))
 On random robots, the sample is the robots: each is learnt once by each learner.
@@ -16,6 +16,7 @@ from scipy import stats
 from changing import AFTER, ANEW, ARM, BEGUN, BLIND, GOES_ON, ROBOTS, SIMULATOR, WRONG, after
 from evidence import Evidence, Level, NotRun
 from judging import Claim, Part, at_most
+from model_files import FILES, REFUSED, RIGHT, WARNED
 from page_tables import MISSING_CELL, Page, markdown
 from random_robots import BASELINE, COUNTS, LEARNERS, RANDOM
 from sgimd_torch.figures.names import NAMES
@@ -119,6 +120,30 @@ def after_change(evidence: Evidence, robot: str, change: str, learner: str, at: 
     if place not in evidence.changes.index or len(errors := evidence.changes.loc[place, "error"]) < 2:
         raise NotRun(f"{learner} after {change} of {robot} at {at}")
     return errors
+
+
+def models(page: Page) -> str:
+    """What came of model files that nobody made for this library."""
+    table = page.evidence.models
+    if (ratios := table.dropna(subset="ratio")).empty:
+        page.missing.append("model files")
+        return "Not run."
+    expected = {(file.path, file.outcome, file.options): file.expected for file in FILES}
+    rows = table.to_dict("records")
+    right = sum(
+        row["told"] == RIGHT if words == RIGHT else words in row["words"]
+        for row in rows
+        if (words := expected.get((row["file"], row["outcome"], row["options"])))
+    )
+    packages = dict.fromkeys(f"{row['file'].partition('/')[0]} {row['version']}" for row in rows)
+    counts = [f"{(table['told'] == word).sum()} {word}" for word in (RIGHT, WARNED, REFUSED)]
+    mean = np.exp(np.log(ratios["ratio"]).mean())
+    return (
+        f"`sgimd check` on {len(rows)} places in {table['file'].nunique()} unchanged files of {', '.join(packages)}: "
+        f"{', '.join(counts)}; {right} as reading them tells ([rows](model_files.csv)). After 500 movements `practice` "
+        f"errs {mean:.2f} times as much as random movements in the mean of {len(ratios)}, worse by its interval on "
+        f"{(ratios['low'] > 1).sum()}."
+    )
 
 
 def seeds(evidence: Evidence) -> str:

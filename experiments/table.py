@@ -28,6 +28,7 @@ from sgimd_torch.spaces import Array
 Row = dict[str, Any]
 FILE: Final = "results.csv"
 ALIKE: Final = "process"  # inverse model that answers for every learner
+_RATIO: Final = ("ratio", "low", "high")
 _ASKED: Final = ("requests", "shown", "late", "late_own", "strong", "weak")
 # Of each table: the number of columns that form its key, and all columns, the key first. Keys of rows are unique.
 TABLES: Final[dict[str, tuple[int, tuple[str, ...]]]] = {
@@ -36,11 +37,13 @@ TABLES: Final[dict[str, tuple[int, tuple[str, ...]]]] = {
     "asked.csv": (3, ("variant", "seed", "teacher", *_ASKED)),
     "rivals.csv": (4, ("rival", "setting", "seed", "movements", "linear", "process")),
     "random.csv": (3, ("number", "learner", "movements", "error", "noticed")),
+    "model_files.csv": (3, ("file", "outcome", "options", "version", "told", "words", "practice", "random", *_RATIO)),
     "changes.csv": (5, ("robot", "change", "learner", "seed", "movements", "error", "noticed")),
 }
 TYPES: Final = {  # types of columns; all other columns have floats, and an empty field is NaN
     **dict.fromkeys(("number", "seed", "movements", "tiles", "noticed", *_ASKED), "int64"),
     **dict.fromkeys(("variant", "task", "answer", "teacher", "rival", "setting", "learner", "robot", "change"), "str"),
+    **dict.fromkeys(("file", "outcome", "options", "version", "told", "words"), "str"),
     **dict.fromkeys(("goals", "near"), "Int64"),  # with empty fields
 }
 LATE: Final = 1000  # number of movements after which requests count as late: the learner should know whom to ask

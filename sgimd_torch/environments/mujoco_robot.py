@@ -28,11 +28,13 @@ from sgimd_torch.environments.models.places import (
     context_box,
     hand_of,
     holding,
+    joint_of,
     moved_by,
     outcome_places,
     path_to,
     positions,
     pulled,
+    slides_on,
 )
 from sgimd_torch.environments.models.posture import touching
 from sgimd_torch.environments.motor_primitives import GaussianPrimitive
@@ -45,6 +47,8 @@ REPEATED: Final = 30  # number of random movements that are executed twice to fi
 LOOKED: Final = 32  # number of random movements that the look before the first movement executes twice
 MOVED: Final = 1e-3  # m or rad, shift of the measured place that counts as moved
 FEWEST: Final = 10  # number of random movements that must move the measured place
+SELDOM: Final = 0.2  # share of random movements that move the measured place; a smaller share is told
+FINEST: Final = 1e-4  # share of T's longest side that a small object at rest may tremble by
 TREMBLE: Final = 1e-6  # m or rad; an object at rest trembles less, which must not look like an effect of a movement
 MOST_STEPS: Final = 100_000  # largest number of timesteps of a movement
 _BLOCK: Final = 32  # number of movements simulated in parallel
@@ -82,7 +86,7 @@ class MujocoRobot:
         low, high: corners of T; () for T found by random movements.
         rest: outcome of not moving; () for the outcome of a movement that holds the start.
         outcome_noise: standard deviation of outcomes if a movement is repeated; None for what ``noise`` makes of random
-            movements, at least 1e-6.
+            movements, at least 1e-6, or less in a small T.
         durations: shortest and longest duration of a movement (s).
         n_knots: number of knots of each joint, after the start, from 2 to 100.
         settle: time (s) between the end of a movement and its outcome.
@@ -145,10 +149,10 @@ class MujocoRobot:
         self.model, self.remarks, self.files = loaded.model, loaded.remarks, files_of(path)
         self._longest, self._settle, self._displacement, self.noise = durations[1], settle, displacement, noise
         self._n_steps(self._longest)
-        commands, self._actuators, said = commands_box(self.model, joints)
+        self._home, self._held = self._begin(loaded.start)
+        commands, self._actuators, said = commands_box(self.model, joints, self._held)
         self.remarks += said
         self.joints = positions(self.model, self._actuators)
-        self._home, self._held = self._begin(loaded.start)
         make = controller or partial(
             GaussianPrimitive,
             durations=durations,
@@ -176,10 +180,11 @@ class MujocoRobot:
         if low or high:
             corners = [check_point(name, corner, self._dim) for name, corner in (("low", low), ("high", high))]
         else:
-            corners = self._explored(still, names, path.name)
+            corners = self._explored(still, names, path.name, said)
         self.outcomes = Box(corners[0], corners[1], tuple(names), self._places[0].unit)
         self.rest = read_only(still if rest else self.outcomes.clip(np.round(still, 3)))
-        self.outcome_noise = max(TREMBLE, self._scatter()) if outcome_noise is None else outcome_noise
+        trembles = min(TREMBLE, FINEST * float(self.outcomes.sides.max()))
+        self.outcome_noise = max(trembles, self._scatter()) if outcome_noise is None else outcome_noise
         check_robot(self)
         if not posture:  # a robot of a run that goes on was looked at before
             self.remarks += self._look()
@@ -387,7 +392,7 @@ class MujocoRobot:
 
     def _look(self) -> list[str]:
         """Sentences on what a user should know before the first movement."""
-        lines, still = parts(self.model), self._held_still()
+        lines, still = parts(self.model, self.bodies), self._held_still()
         if still is not None:
             sunk = float(np.linalg.norm(self._read(still[-1]) - self._read(still[0])))
             mujoco.mj_forward(self.model, data := self._at(still[-1]))
@@ -395,7 +400,9 @@ class MujocoRobot:
             if names:
                 lines.append(f"holding still, the robot touches itself: {listed(names)}; give --environment.keyframe")
             if sunk > SUNK:
-                advice = "" if self.joints else "; its commands are no positions: --environment.servos made holds it"
+                endless = all(slides_on(self.model, joint_of(self.model, k)) for k in self._actuators)
+                advice = "; its commands are no positions: --environment.servos made holds it"
+                advice = "" if self.joints or endless else advice
                 lines.append(f"holding still, what is measured moves by {self.outcomes.amount(sunk, '.2g')}{advice}")
         contexts, thetas = self._drawn("look", LOOKED)
         signs = [stream(0, "signs", k).choice([-1, 1], self.policies.dim) for k in range(LOOKED)]
@@ -432,24 +439,28 @@ class MujocoRobot:
         one, other = (self._tried(REPEATED, execution)[1] for execution in ("one", "other"))
         return float(np.sqrt(np.nanmean(np.square(one - other)) / 2))
 
-    def _explored(self, rest: Array, names: Sequence[str], file: str) -> list[Array]:
-        """Corners of T, found by random movements."""
+    def _explored(self, rest: Array, names: Sequence[str], file: str, said: Sequence[str]) -> list[Array]:
+        """Corners of T, found by random movements; a refusal repeats what was ``said`` of the commands."""
         starts, ends = self._tried(EXPLORED, "T")
         lost = int(np.isnan(ends).any(axis=1).sum())
         moved = ends[(np.abs(ends - starts) > MOVED).any(axis=1)]
+        what = f"{len(moved)} of {EXPLORED} random movements of {file} move {', '.join(names)}"
+        held = [self.model.body(body).name for _, body in pulled(self.model)]
+        nearer = f"free {held[0]} from its mocap body: --environment.servos made" if held else ""
+        nearer = nearer or "put the object nearer to the robot"
         if len(moved) < FEWEST:
-            held = [self.model.body(body).name for _, body in pulled(self.model)]
-            nearer = f"free {held[0]} from its mocap body: --environment.servos made" if held else ""
-            nearer = nearer or "put the object nearer to the robot"
+            carried = all(place.axes and body_of(self.model, place) in self.bodies for place in self._places)
+            nearer = "does it lie on the axis that turns it? Measure a place beside it" if carried else nearer
             advice = f"give low and high, which are the corners of T, or {nearer}" if len(moved) else nearer
             advice = "write a shorter timestep into the model" if lost == EXPLORED else advice
-            what = f"{len(moved)} of {EXPLORED} random movements of {file} move {', '.join(names)}"
-            raise ValueError(f"{what}, {lost} diverge; {advice}")
+            raise ValueError("; ".join([f"{what}, {lost} diverge", advice, *said]))
+        if len(moved) < SELDOM * EXPLORED:
+            self.remarks.append(f"only {what}, so little is learnt: {nearer}")
         low, high = np.quantile(moved, (0.05, 0.95), axis=0)  # an object that flies away does not set the size of T
         low, high = np.minimum(low, rest) - 0.1 * (high - low), np.maximum(high, rest) + 0.1 * (high - low)
         flat = [name for name, side in zip(names, high - low, strict=True) if side < MOVED]
         if flat:
-            raise ValueError(f"{', '.join(flat)} never changes; leave it out, as in site:tip:xy")
+            raise ValueError("; ".join([f"{', '.join(flat)} never changes; leave it out, as in site:tip:xy", *said]))
         # Round numbers stay equal if a replay finds T again on another processor.
         scale = 10.0 ** (1 - np.floor(np.log10((high - low).max())))
         corners = np.floor(low * scale) / scale, np.ceil(high * scale) / scale

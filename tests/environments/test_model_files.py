@@ -25,6 +25,8 @@ PULLED = """<mujoco><worldbody>
     <body name="puller" mocap="true"/></worldbody>
   <equality><weld body1="puller" body2="cart"/></equality>
   <actuator><position joint="grip" kp="5"/></actuator></mujoco>"""
+CART = """<mujoco><worldbody><body name="cart"><joint name="x" type="slide" axis="1 0 0"/><geom size=".1"/></body>
+  </worldbody><actuator><motor joint="x" ctrlrange="-1 1"/></actuator></mujoco>"""
 LINK = (
     '<link name="{}"><inertial><origin xyz=".1 0 0"/><mass value="1"/>'
     '<inertia ixx=".01" iyy=".01" izz=".01" ixy="0" ixz="0" iyz="0"/></inertial></link>'
@@ -39,6 +41,25 @@ LOST = (
     '<link name="x"><collision><geometry><mesh filename="package://lost/a.stl"/></geometry></collision></link>'
     '<joint name="y" type="fixed"><parent link="upper"/><child link="x"/></joint></robot>'
 )
+# A wheel that its motor turns slowly, for its damping, and a light one with more damping than a stiff servo would bear.
+SLOW = """<mujoco><option timestep=".0025"/><worldbody>
+    <body name="wheel"><joint name="wheel" range="-90 90" damping="4"/><geom size=".1"/>
+      <site name="rim" pos=".1 0 0"/></body>
+    <body pos="1 0 0"><joint name="light" range="-90 90" damping="10"/><geom size=".02"/></body></worldbody>
+  <actuator><motor joint="wheel" ctrlrange="-5 5"/><motor joint="light"/></actuator></mujoco>"""
+# A ship that floats, with a mast on a ball joint and a flap that a tendon pulls.
+SHIP = """<mujoco><compiler settotalmass="1"/><option gravity="0 0 0"/><worldbody>
+    <body name="ship"><freejoint name="afloat"/><geom size=".1"/>
+      <body pos="0 0 .2"><joint name="mast" type="ball"/><geom size=".02"/>
+        <body><joint name="flap" range="-60 60" axis="0 1 0"/><geom size=".01" pos=".1 0 0"/></body></body></body>
+  </worldbody><tendon><fixed name="rope"><joint joint="flap" coef="1"/></fixed></tendon>
+  <actuator><motor tendon="rope" ctrlrange="-1 1"/></actuator></mujoco>"""
+GATE = """<mujoco><option gravity="0 0 0"/><worldbody>
+    <body name="turner"><joint name="turn" range="-60 60" damping="1"/>
+      <geom type="capsule" fromto="0 0 0 .2 0 0" size=".01"/></body>
+    <body pos=".1 .155 0"><joint name="gate" damping=".1"/>
+      <geom type="capsule" fromto="0 0 0 .1 0 0" size=".01"/></body></worldbody>
+  <actuator><motor joint="turn"/></actuator></mujoco>"""
 KEY = '<keyframe><key name="Home" qpos=".3 .7 0"/></keyframe>'
 NONE = np.zeros(0)
 
@@ -47,6 +68,7 @@ NONE = np.zeros(0)
 def here(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     pieces = ("arm.xml", ARM), ("arm.urdf", URDF), ("pulled.xml", PULLED), ("arm.sdf", "<sdf/>")
+    pieces += ("slow.xml", SLOW), ("ship.xml", SHIP), ("gate.xml", GATE), ("cart.xml", CART)
     for name, text in pieces:
         (tmp_path / name).write_text(text)
     return tmp_path
@@ -73,13 +95,19 @@ def test_an_arm_with_motors_begins_within_its_ranges_holds_still_and_goes_where_
 def test_the_motors_of_the_file_let_it_fall_and_a_remark_says_so(here):
     robot = MujocoRobot("arm.xml", outcome="site:r:tip:x:xz", servos="file", low=(-1, -1), high=(1, 1))
     assert robot.joints == ()
-    assert any("holding still, what is measured moves by" in remark for remark in robot.remarks)
+    (falls,) = (remark for remark in robot.remarks if "holding still, what is measured moves by" in remark)
+    assert falls.endswith("--environment.servos made holds it")
+
+
+def test_what_slides_without_a_range_is_not_said_to_be_held_by_servos(here):
+    (here / "cart.xml").write_text(CART.replace("<worldbody>", '<option gravity="1 0 0"/><worldbody>'))
+    robot = MujocoRobot("cart.xml", outcome="body:cart:x", servos="file", low=(-1,), high=(1,))
+    (falls,) = (remark for remark in robot.remarks if "holding still" in remark)
+    assert "servos" not in falls
 
 
 def test_a_keyframe_named_home_is_the_start(here):
-    (here / "arm.xml").write_text(
-        ARM.replace("<actuator>", '<keyframe><key name="Home" qpos=".3 .7 0"/></keyframe><actuator>')
-    )
+    (here / "arm.xml").write_text(ARM.replace("<actuator>", KEY + "<actuator>"))
     robot = MujocoRobot("arm.xml", outcome="site:r:tip:x:xz", low=(-1, -1), high=(1, 1))
     assert robot.start == pytest.approx([0.3, 0.7])
 
@@ -90,6 +118,46 @@ def test_no_movement_exceeds_the_speeds_of_a_urdf(here):
     speeds = np.abs(np.diff(commands, axis=0)).max(axis=0) / np.diff(times)[0]
     assert (speeds < 5.01).all()
     assert speeds.max() > 2
+
+
+def test_a_joint_with_more_than_a_turn_begins_where_the_file_says_and_reaches_each_posture_once(here):
+    free = ARM.replace('range="-150 150"', "").replace('range="20 150"', 'range="-600 600"')
+    (here / "arm.xml").write_text(free.replace("<actuator>", KEY.replace(".3 .7", "4 10") + "<actuator>"))
+    robot = MujocoRobot("arm.xml", outcome="site:r:tip:x:xz", low=(-1, -1), high=(1, 1))
+    box = robot.primitive.joints
+    assert robot.start == pytest.approx([4, 10])
+    assert box.low == pytest.approx([4 - np.pi, np.deg2rad(600) - 2 * np.pi])
+    assert box.high == pytest.approx([4 + np.pi, np.deg2rad(600)])
+
+
+def test_damping_neither_leaves_a_light_joint_behind_nor_asks_a_motor_for_more_than_it_has(here):
+    robot = MujocoRobot("slow.xml", outcome="joint:wheel,joint:light", low=(-2, -2), high=(2, 2))
+    theta = np.array([0.5, 0.5, 0.9, 0.9] * 2 + [0.0])
+    times, commands = robot.primitive.trajectory(theta, rate=500)
+    assert np.abs(np.diff(commands[:, 0])).max() / np.diff(times)[0] < 5 / 4  # force over damping
+    assert robot.execute(NONE, theta, stream(0, "x")) == pytest.approx(commands[-1], abs=0.02)
+
+
+def test_a_floating_base_and_a_ball_joint_move_freely_and_a_joint_that_a_tendon_pulls_does_not(here):
+    robot = MujocoRobot("ship.xml", outcome="body:ship:x", low=(-1,), high=(1,))
+    assert "without an actuator, so they move freely: afloat, mast" in robot.remarks
+    assert sum(remark.startswith("warning: compiler attribute 'settotalmass'") for remark in robot.remarks) == 1
+
+
+def test_a_place_that_moves_by_millimetres_keeps_every_promise(here):
+    (here / "slow.xml").write_text(SLOW.replace('pos=".1 0 0"', 'pos=".003 0 0"'))
+    check_environment(MujocoRobot("slow.xml", outcome="site:rim:xy"))
+
+
+def test_a_thing_that_few_movements_reach_is_told(here):
+    robot = MujocoRobot("gate.xml", outcome="joint:gate")
+    assert any("random movements of gate.xml move gate, so little is learnt: put" in line for line in robot.remarks)
+
+
+def test_blanks_around_a_urdf_hide_none_of_its_speeds(here):
+    (here / "arm.urdf").write_bytes(b'\n<?xml version="1.0"?>\n' + URDF.encode() + b"\r\n\0")
+    robot = MujocoRobot("arm.urdf", outcome="joint:turn", low=(-1,), high=(1,), durations=(0.05, 0.1))
+    assert robot.primitive.duration(np.array([0, 1, 0, 1, 0.0])) > 0.2
 
 
 def test_links_that_touch_are_moved_apart_by_the_shortest_way():
@@ -118,6 +186,8 @@ def test_an_arm_that_a_mocap_body_pulls_is_moved_by_its_joints_if_asked_for(here
         ({"model": "arm.sdf"}, "arm.sdf is an SDF file; MuJoCo reads MJCF and URDF"),
         ({"servos": "mad"}, "unknown servos 'mad'; did you mean made?"),
         ({"posture": (0.0,)}, "posture must have shape (..., 3)"),
+        ({"model": "cart.xml", "outcome": "body:cart:x"}, "slides without a range stay where they are: x;"),
+        ({"model": "gate.xml", "outcome": "body:turner", "low": (), "high": ()}, "does it lie on the axis"),
     ],
 )  # fmt: skip
 def test_a_slip_is_told_with_its_cause(here, options, said):
@@ -129,6 +199,10 @@ def test_a_slip_is_told_with_its_cause(here, options, said):
     ("change", "said"),
     [
         (('ixx=".01"', 'ixx=".1"'), 'write <mujoco><compiler balanceinertia="true"/></mujoco> into arm.urdf'),
+        (
+            ('mass value="1"', 'mass value="0"'),
+            'write <mujoco><compiler boundmass="1e-4" boundinertia="1e-6"/></mujoco>',
+        ),
         (("</robot>", LOST), "put the folder lost there"),
     ],
 )

@@ -10,6 +10,8 @@ from changing import GRADUAL, UNDONE, Changing, errors
 from evidence import Evidence, NotRun
 from lives import make_lives
 from made_lives import ALIVE, life, write_lives
+from model_files import File
+from page_tables import Page
 from random_robots import FAMILIES, LEARNERS, RandomRobot, kind
 from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.environments.planar_arm import PlanarArm
@@ -94,6 +96,14 @@ def test_the_learner_of_before_is_compared_with_the_one_that_starts_anew(tmp_pat
     assert robots.over_anew(found, "toss", "gain", 250, level=None).value == pytest.approx(0.4)
     with pytest.raises(NotRun, match="goes-on after gain of fishing-rod at 1000"):
         robots.over_anew(found, "fishing-rod", "gain", 1000)
+
+
+def test_model_files_are_counted_by_what_is_told_and_errors_on_them_compared(tmp_path, monkeypatch):
+    files = [File("dm_control/arm.xml", "site:tip"), File("robosuite/arm.xml", "geom:x", "cannot")]
+    monkeypatch.setattr(robots, "FILES", files)
+    said = robots.models(Page(found_in(tmp_path), tmp_path))
+    assert "2 places in 2 unchanged files of dm_control 1.0, robosuite 1.5: 1 right, 0 warned, 1 refused; 1 as" in said
+    assert "errs 0.80 times as much as random movements in the mean of 1, worse by its interval on 0." in said
 
 
 def test_lives_that_the_table_has_are_not_made_again_and_the_others_get_their_rows(tmp_path):

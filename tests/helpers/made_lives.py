@@ -1,4 +1,4 @@
-"""Lives for processes of their own, which import this module, and made-up rows of random.csv and changes.csv."""
+"""Lives for processes of their own, which import this module, and made-up rows of tables on robots."""
 
 import numpy as np
 
@@ -12,7 +12,10 @@ def life(number, learner):
 
 
 def write_lives(folder, factor=lambda *key: 1.0, robots=60, seeds=8):
-    """Tables in which every claim is true; ``factor`` (columns of the key) -> factor of an error."""
+    """Tables in which every claim is true; ``factor`` (columns of the key) -> factor of an error.
+
+    Two model files: `practice` errs .8 times as much as random movements on one, the other is refused.
+    """
     from changing import AFTER, ARM, BEGUN, CHANGES, ROBOTS, SIMULATOR, after, learners
     from random_robots import COUNTS, LEARNERS, RANDOM
 
@@ -32,4 +35,9 @@ def write_lives(folder, factor=lambda *key: 1.0, robots=60, seeds=8):
                     error = {"goes-on": goes_on[at], "wrong": 0.9}.get(learner, 1.0) * np.exp(0.01 * (seed % 3))
                     rows.append((robot, change, learner, seed, at, error * factor(robot, change, learner, at), 0))
     merge(folder, "changes.csv", [dict(zip(TABLES["changes.csv"][1], row, strict=True)) for row in rows])
+    rows = [
+        ("dm_control/arm.xml", "site:tip", "", "1.0", "right", "", 0.4, 0.5, 0.8, 0.7, 0.9),
+        ("robosuite/arm.xml", "geom:x", "", "1.5", "refused", "no", *[None] * 5),
+    ]
+    merge(folder, "model_files.csv", [dict(zip(TABLES["model_files.csv"][1], row, strict=True)) for row in rows])
     return folder

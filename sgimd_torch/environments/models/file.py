@@ -5,6 +5,7 @@ robot = load_model(Path("arm.xml"), (), "auto", "", ()); robot.model, robot.star
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -64,6 +65,13 @@ def load_model(path: Path, joints: Sequence[str], servos: str, keyframe: str, po
         ValueError: MuJoCo refuses the file, there is nothing that moves, or an option does not fit.
         OSError: there is no such file.
     """
+    with warnings.catch_warnings(record=True) as heard:
+        warnings.simplefilter("always")
+        loaded = _load(path, joints, servos, keyframe, posture)
+    return loaded._replace(remarks=[*loaded.remarks, *dict.fromkeys(f"warning: {each.message}" for each in heard)])
+
+
+def _load(path: Path, joints: Sequence[str], servos: str, keyframe: str, posture: Sequence[float]) -> Loaded:
     check_regular(path)  # MuJoCo's own message of a missing file is no OSError
     if servos not in SERVOS:
         raise unknown_name_error("servos", servos, SERVOS)
@@ -71,7 +79,7 @@ def load_model(path: Path, joints: Sequence[str], servos: str, keyframe: str, po
         raise ValueError(f"{path.name} is an SDF file; MuJoCo reads MJCF and URDF, so give the robot's URDF")
     with suppress(ElementTree.ParseError):  # MuJoCo says where
         _check_parts(path)
-    remarks, accelerations = list[str](), dict[str, float]()
+    remarks, slow, accelerations = list[str](), dict[str, float](), dict[str, float]()
     try:
         spec = mujoco.MjSpec.from_file(str(path))
         for mesh in spec.meshes:
@@ -80,15 +88,17 @@ def load_model(path: Path, joints: Sequence[str], servos: str, keyframe: str, po
             for k, element in enumerate(kind):
                 element.name = element.name or f"unnamed_{k}"
         spec.compiler.fusestatic = False  # else links on fixed joints of a URDF, such as its tool, lose their names
-        model, root = spec.compile(), ElementTree.parse(path).getroot()
+        model, root = spec.compile(), _root(path)
         alone, limits = root.tag == "robot", [(joint, joint.find("limit")) for joint in root.iter("joint")]
         # MuJoCo does not read the speeds of a URDF.
         speeds = {
-            joint.get("name", ""): float(limit.get("velocity", 0)) for joint, limit in limits if limit is not None
+            joint.get("name", ""): max(0.0, float(limit.get("velocity", 0))) or np.inf
+            for joint, limit in limits
+            if limit is not None
         }
         if served := joints_to_serve(model, servos, joints, alone=alone):
             cause, held = "motors that are no servos" if model.nu else "no actuators", len(pulled(model))
-            model, accelerations = serve(spec, model, served)
+            model, slow, accelerations = serve(spec, model, served)
             names = ", ".join(model.joint(k).name for k in served)
             remarks.append(f"{path.name} has {cause}: position servos were made for {names}")
             if held > len(pulled(model)):
@@ -114,22 +124,21 @@ def load_model(path: Path, joints: Sequence[str], servos: str, keyframe: str, po
             data = _reset(model, keyframe)
             data.qpos[:] = start
         kept = tuple(float(x) for x in data.qpos[model.jnt_qposadr[movable(model)]])
-        return Loaded(
-            model, data, kept, {name: speed for name, speed in speeds.items() if speed > 0}, accelerations, remarks
-        )
-    except ValueError as error:
+        speeds |= {name: min(speed, speeds.get(name, np.inf)) for name, speed in slow.items()}
+        return Loaded(model, data, kept, speeds, accelerations, remarks)
+    except (ValueError, ElementTree.ParseError) as error:
         raise ValueError(f"{path.name} cannot be used: {_with_advice(' '.join(str(error).split()), path)}") from error
 
 
 def _check_parts(path: Path) -> None:
     """Refuse a pipe or a device among the files that a model includes or refers to; MuJoCo would wait for them."""
-    elements, known = [*ElementTree.parse(path).iter()], {path}
+    elements, known = [*_root(path).iter()], {path}
     for element in elements:  # grows
         included = path.parent / element.get("file", "")
         if element.tag == "include" and included not in known and included.exists() and not included.is_dir():
             check_regular(included)
             known.add(included)
-            elements += ElementTree.parse(included).iter()
+            elements += _root(included).iter()
     compilers = [element.attrib for element in elements if element.tag == "compiler"]
     folders = {path.parent / compiler.get(kind, "") for compiler in compilers for kind in _FOLDERS} | {path.parent}
     for element in elements:
@@ -137,6 +146,11 @@ def _check_parts(path: Path) -> None:
             for place in (folder / name for folder in folders for name in (file, Path(file).name)):
                 if place.exists():
                     check_regular(place)
+
+
+def _root(path: Path) -> ElementTree.Element:
+    """The first tag of a file; as for MuJoCo, blanks around it do no harm."""
+    return ElementTree.fromstring(path.read_bytes().strip(b"\0 \t\r\n"))
 
 
 def files_of(path: Path) -> list[Path]:
@@ -212,10 +226,15 @@ def _of_package(path: Path, file: str) -> str:
 
 def _with_advice(said: str, path: Path) -> str:
     """A message of MuJoCo, with what to do."""
-    line = '<compiler balanceinertia="true"/>'
-    line = f"<mujoco>{line}</mujoco>" if path.suffix.lower() == ".urdf" else line
     advice = {
-        "balanceinertia": f"; write {line} into {path.name}, after its first tag",
+        "balanceinertia": _write('balanceinertia="true"', path),
+        "mjMINVAL": _write('boundmass="1e-4" boundinertia="1e-6"', path),
         "find decoder": "; MuJoCo reads models as MJCF or URDF, and meshes as .stl, .obj or .msh",
     }
     return said + "".join(text for word, text in advice.items() if word in said)
+
+
+def _write(attributes: str, path: Path) -> str:
+    line = f"<compiler {attributes}/>"
+    line = f"<mujoco>{line}</mujoco>" if path.suffix.lower() == ".urdf" else line
+    return f"; write {line} into {path.name}, after its first tag"

@@ -11,7 +11,7 @@ from typing import Final
 import mujoco
 import numpy as np
 
-from sgimd_torch.environments.models.places import UNITS, joint_of, pulled
+from sgimd_torch.environments.models.places import UNITS, joints_above, pulled
 from sgimd_torch.environments.models.posture import movable
 from sgimd_torch.spaces import Array, Box
 
@@ -24,10 +24,12 @@ _HOPELESS: Final = 0.1  # share of such pairs that is told
 _PARTS: Final = 4  # number of parts of each side of T whose visits are counted
 
 
-def parts(model: mujoco.MjModel) -> list[str]:
-    """What no actuator moves."""
-    acted = {joint_of(model, k) for k in range(model.nu)}
-    passive = [model.joint(k).name for k in movable(model) if k not in acted]
+def parts(model: mujoco.MjModel, bodies: Sequence[int]) -> list[str]:
+    """What no actuator moves, of ``bodies`` also their ball joints and a floating base."""
+    mujoco.mj_forward(model, data := mujoco.MjData(model))
+    acted = {*model.dof_jntid[data.moment_colind[data.actuator_moment != 0]]}  # by tendons, too
+    able = {*movable(model), *(k for body in bodies for k in joints_above(model, body))}
+    passive = [model.joint(k).name for k in sorted(able - acted)]
     held = [model.body(body).name for _, body in pulled(model)]
     lines = [f"without an actuator, so they move freely: {listed(passive)}"] if passive else []
     return [*lines, f"mocap bodies hold {listed(held)}; --environment.servos made frees them"] if held else lines

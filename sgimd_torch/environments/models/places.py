@@ -125,12 +125,13 @@ def context_box(model: mujoco.MjModel, context: str) -> tuple[Box, list[int]]:
     return Box(lows, highs, tuple(names), "m" if {*units} == {"m"} else ""), addresses
 
 
-def commands_box(model: mujoco.MjModel, joints: Sequence[str]) -> tuple[Box, list[int], list[str]]:
+def commands_box(model: mujoco.MjModel, joints: Sequence[str], start: Array) -> tuple[Box, list[int], list[str]]:
     """Ranges of the commands of a movement, the actuator of each command, and remarks.
 
     Args:
         model: model of the robot.
         joints: names of joints, or of actuators that act on no joint; () for all actuators.
+        start: ``(nu,)`` commands that hold the start; no joint turns by more than half a turn from there.
 
     Raises:
         ValueError: a joint does not exist or has no actuator, or a command has no range.
@@ -147,33 +148,43 @@ def commands_box(model: mujoco.MjModel, joints: Sequence[str]) -> tuple[Box, lis
             raise ValueError(f"joints: {name!r} is no joint with an actuator{hint}")
     chosen, endless = [k for name in joints or moved for k in moved[name]], list[str]()
     if not joints:  # a slide without a range, such as that of a base, stays where it is
-        chosen = [k for k in chosen if model.actuator_ctrllimited[k] or not _slides_on(model, joint_of(model, k))]
+        held = [k for k in chosen if not model.actuator_ctrllimited[k] and slides_on(model, joint_of(model, k))]
+        chosen = [k for k in chosen if k not in held]
+        sliding = ", ".join(model.joint(joint_of(model, k)).name for k in held)
+        advice = "write ranges into the model, or command forces: --environment.servos file"
+        remarks += [f"slides without a range stay where they are: {sliding}; {advice}"] * bool(held)
     for k in chosen:
         joint, side = joint_of(model, k), model.actuator_ctrlrange[k]
         if not model.actuator_ctrllimited[k]:
             if joint is None or not is_servo(model, k):
                 raise ValueError(f"actuator {model.actuator(k).name!r} has no ctrlrange; write one into the model")
-            side = model.jnt_range[joint]
-            if not model.jnt_limited[joint]:
-                if _slides_on(model, joint):
-                    raise ValueError(
-                        f"joint {model.joint(joint).name!r} slides without a range; write one into the model"
-                    )
-                side = np.array([-np.pi, np.pi])
-                endless.append(model.joint(joint).name)
+            if slides_on(model, joint):
+                raise ValueError(f"joint {model.joint(joint).name!r} slides without a range; write one into the model")
+            side = model.jnt_range[joint] if model.jnt_limited[joint] else np.array([-np.inf, np.inf])
             side = np.sort(side * model.actuator_gear[k, 0])
+        turn = 2 * np.pi * abs(model.actuator_gear[k, 0])
+        if (
+            joint is not None
+            and UNITS.get(int(model.jnt_type[joint])) == "rad"
+            and is_servo(model, k)
+            and np.ptp(side) > turn
+        ):
+            low = np.clip(start[k] - turn / 2, side[0], side[1] - turn)
+            side = np.array([low, low + turn])
+            endless.append(model.joint(joint).name)
         sides.append(side)
     if endless:
-        remarks.append(f"without a range, so from -pi to pi: {', '.join(endless)}")
+        remarks.append(f"more than a turn would be free, so half a turn each way from the start: {', '.join(endless)}")
     if not chosen:
-        raise ValueError("no actuator moves a joint of the model with a range; write a range into the model")
+        raise ValueError("; ".join(["no actuator moves a joint of the model with a range", *remarks]))
     owners = [joint_of(model, k) for k in chosen]
     names = [model.actuator(k).name if j is None else model.joint(j).name for j, k in zip(owners, chosen, strict=True)]
     low, high = np.array(sides).T
     return Box(low, high, tuple(names)), chosen, remarks
 
 
-def _slides_on(model: mujoco.MjModel, joint: int | None) -> bool:
+def slides_on(model: mujoco.MjModel, joint: int | None) -> bool:
+    """Whether a joint slides without a range."""
     return joint is not None and not model.jnt_limited[joint] and UNITS.get(int(model.jnt_type[joint])) == "m"
 
 

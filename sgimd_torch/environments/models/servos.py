@@ -17,8 +17,9 @@ from sgimd_torch.spaces import Array, stream
 
 FREQUENCY: Final = 30.0  # rad/s, natural frequency of a servo
 SHARE: Final = 0.5  # share of the force of a joint that its commands may ask for to accelerate it
+DAMPED: Final = 0.8  # share that they may ask for against damping; the greatest speed is not that of the acceleration
 SAG: Final = 0.01  # rad or m, largest error of a servo that holds a joint against friction and weight
-_STIFFEST: Final = 0.5  # largest product of a servo's natural frequency and the timestep; 2 is unstable
+_STIFFEST: Final = 0.5  # largest product of an undamped servo's natural frequency and the timestep; 2 is unstable
 _POSTURES: Final = 50  # number of random postures that measure inertias and loads
 
 
@@ -47,12 +48,15 @@ def joints_to_serve(model: mujoco.MjModel, servos: str, joints: Sequence[str], *
     return [k for root, k in zip(roots, movable, strict=True) if root in wanted]
 
 
-def serve(spec: mujoco.MjSpec, model: mujoco.MjModel, chosen: Sequence[int]) -> tuple[mujoco.MjModel, dict[str, float]]:
-    """Give position servos to ``chosen`` joints, in place of their motors, and compile; with their accelerations.
+def serve(
+    spec: mujoco.MjSpec, model: mujoco.MjModel, chosen: Sequence[int]
+) -> tuple[mujoco.MjModel, dict[str, float], dict[str, float]]:
+    """Give position servos to ``chosen`` joints, in place of their motors, and compile; with speeds and accelerations.
 
     As those of an arm that one can buy, the servos know the weight of the links: it is compensated. A servo moves the
     greatest inertia of its joint with the natural frequency, and outweighs damping and friction. The force of a motor
-    stays within its limits. Nothing else may pull the arm: constraints to mocap bodies go.
+    stays within its limits, and so do speeds and accelerations. Nothing else may pull the arm: constraints to mocap
+    bodies go.
     """
     names = [model.joint(k).name for k in chosen]
     if not names:
@@ -83,19 +87,21 @@ def serve(spec: mujoco.MjSpec, model: mujoco.MjModel, chosen: Sequence[int]) -> 
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST  # stable with the damping of light joints
     compensated = spec.compile()
     inertias, loads = _burdens(compensated, chosen)
-    accelerations = dict[str, float]()
+    speeds, accelerations = dict[str, float](), dict[str, float]()
     for name, k in zip(names, chosen, strict=True):
         dof = int(model.jnt_dofadr[k])
         inertia, damping = inertias[dof], float(compensated.dof_damping[dof])
         stiffness = max(inertia * FREQUENCY**2, damping * FREQUENCY / 2, loads[dof] / SAG)
-        stiffness = min(stiffness, inertia * (_STIFFEST / compensated.opt.timestep) ** 2)
+        timestep = compensated.opt.timestep  # unstable from (4 inertia / timestep + 2 damping) / timestep on
+        stiffness = min(stiffness, _STIFFEST**2 * (inertia / timestep + damping / 2) / timestep)
         if compensated.jnt_actfrclimited[k]:
-            accelerations[name] = SHARE * float(np.abs(compensated.jnt_actfrcrange[k]).max()) / inertia
+            force = float(np.abs(compensated.jnt_actfrcrange[k]).max())
+            speeds[name], accelerations[name] = DAMPED * force / damping if damping else np.inf, SHARE * force / inertia
         servo = motors.get(name) or spec.add_actuator(name=name, target=name)
         servo.trntype, servo.gear, servo.ctrllimited, servo.forcelimited = mujoco.mjtTrn.mjTRN_JOINT, np.eye(6)[0], 0, 0
         servo.dyntype, servo.actlimited = mujoco.mjtDyn.mjDYN_NONE, 0
         servo.set_to_position(kp=stiffness, kv=max(0.0, 2 * np.sqrt(stiffness * inertia) - damping))
-    return spec.compile(), accelerations
+    return spec.compile(), speeds, accelerations
 
 
 def _effort(model: mujoco.MjModel, actuator: int) -> float:
