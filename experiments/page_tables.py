@@ -197,11 +197,12 @@ class Page:
                 continue
             columns = life.error, 1000 * life.seconds / life.movements, life.movements_then, life.error_then
             error, ms, movements, error_then = map(interquartile_mean, columns)
-            over, over_then = f"{error:.3g}", f"{error_then:.3g}"
+            first, over, over_then = robot, f"{error:.3g}", f"{error_then:.3g}"
             if search != SEARCHES[0]:
+                first = ""
                 over = self.cell(self.evidence.over, life.error, usual.error, form=".2f", between=True)
                 over_then = self.cell(self.evidence.over, life.error_then, usual.error_then, form=".2f", between=True)
-            rows.append([robot, f"`{search}`", over, f"{ms:.1f}", f"{movements:.0f}", over_then])
+            rows.append([first, f"`{search}`", over, f"{ms:.1f}", f"{movements:.0f}", over_then])
         head = ("robot", "search", "error, equal movements", "ms", "movements, equal time", "error, equal time")
         return markdown(head, rows)
 

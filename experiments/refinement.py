@@ -33,7 +33,7 @@ ROBOTS: Final[Mapping[str, Mapping[str, Any]]] = {  # options of a run, by names
     "rod by paper": {**SGIM_D, "environment": ROD, "inverse": "paper"},
     "rod by process": {**SGIM_D, "environment": ROD},
     "planar-arm-7 by process": {"algorithm": "sgim-d", "environment": "planar-arm-7"},
-    "spatial-arm by process": {"algorithm": "sagg-riac", "environment": "experiments.toys:spatial_arm"},  # nobody teaches it
+    "spatial-arm by process": {"algorithm": "sagg-riac", "environment": "experiments.toys:spatial_arm"},  # not taught
 }
 MOVEMENTS: Final = 2000
 WARM: Final = 200  # movements of lives before those that count, so that everything is loaded and compiled

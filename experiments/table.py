@@ -44,7 +44,8 @@ TABLES: Final[dict[str, tuple[int, tuple[str, ...]]]] = {
 }
 TYPES: Final = {  # types of columns; all other columns have floats, and an empty field is NaN
     **dict.fromkeys(("number", "seed", "movements", "movements_then", "tiles", "noticed", *_ASKED), "int64"),
-    **dict.fromkeys(("variant", "task", "answer", "teacher", "rival", "setting", "learner", "robot", "change", "search"), "str"),
+    **dict.fromkeys(("variant", "task", "answer", "teacher", "rival", "setting", "learner"), "str"),
+    **dict.fromkeys(("robot", "change", "search"), "str"),
     **dict.fromkeys(("goals", "near"), "Int64"),  # with empty fields
 }
 LATE: Final = 1000  # number of movements after which requests count as late: the learner should know whom to ask

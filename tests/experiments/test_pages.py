@@ -150,10 +150,8 @@ def test_the_page_of_searches_has_errors_over_those_of_the_simplex_and_the_cost_
     ]
     write(write_rows(tmp_path), rows, TABLE)
     text, page = filled("FORWARD_MODEL", Evidence.of(tmp_path), tmp_path)
-    assert [line for line in text.splitlines() if line.startswith(f"| {ROBOT}")] == [
-        f"| {ROBOT} | `nelder-mead` | 0.1 | 2.0 | 200 | 0.2 |",
-        f"| {ROBOT} | `gradient` | 0.50 | 8.0 | 50 | 0.50 |",
-    ]
+    usual = f"| {ROBOT} | `nelder-mead` | 0.1 | 2.0 | 200 | 0.2 |"
+    assert f"{usual}\n|  | `gradient` | 0.50 | 8.0 | 50 | 0.50 |\n" in text
     assert f"gradient-then-nelder-mead on {ROBOT}" in page.missing
 
 
