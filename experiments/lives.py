@@ -17,9 +17,10 @@ from typing import Any, Final
 from sgimd_torch.runs.signals import Progress, say
 from table import TABLES, merge, read_table
 
-MakeLife = Callable[..., Mapping[int, tuple[float, int]]]
-"""Function of a key that returns, for each number of movements, the error and how many changes were noticed by then."""
-_LATE: Final = -1  # the key of a row ends with its number of movements
+MakeLife = Callable[..., Mapping[Any, tuple[float, ...]]]
+"""Function of a key that returns the rows of a life: by the last part of a row's key, such as its number of movements,
+the other columns, such as the error and how many changes were noticed by then."""
+_LATE: Final = -1  # the key of a row ends with what differs between the rows of a life
 
 
 def make_lives(
@@ -55,5 +56,5 @@ def parser(about: str | None) -> argparse.ArgumentParser:
     return made
 
 
-def _made(make_life: MakeLife, key: tuple[Any, ...]) -> tuple[tuple[Any, ...], Mapping[int, tuple[float, int]]]:
+def _made(make_life: MakeLife, key: tuple[Any, ...]) -> tuple[tuple[Any, ...], Mapping[Any, tuple[float, ...]]]:
     return key, make_life(*key)

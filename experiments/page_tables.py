@@ -7,13 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 from pathlib import Path
 from typing import Final
 
 from claimed import SUITE, on, paper
 from evidence import LAST, Evidence, NotRun, Statistic
 from judging import MISSING, Claim, Verdict, judge
-from sgimd_torch.views.statistics import interval_text
+from refinement import ROBOTS, SEARCHES, TABLE
+from sgimd_torch.views.statistics import interquartile_mean, interval_text
 from suite import TASKS, UNIFORM, titled
 from table import read_table
 from variants import ARMS, EXPERIMENTS, VARIANTS
@@ -182,6 +184,26 @@ class Page:
                 [f"`{name}`", *self.errors(f"{name}{by}", (1000, LAST), ".4f"), *cells, self.error(name, form=".4f")]
             )
         head = ("learner", "rod, 1000", "rod, 5000", "arm of 7, 2000", "arm of 50, 2000", "rod, 5000, by `process`")
+        return markdown(head, rows)
+
+    def refinement(self) -> str:
+        """Cost and error of the searches, at equal movements and at equal time; errors over those of the first one."""
+        table = read_table(self.folder, TABLE).set_index("seed")
+        rows = []
+        for robot, search in product(ROBOTS, SEARCHES):
+            usual, life = (table[(table.robot == robot) & (table.search == name)] for name in (SEARCHES[0], search))
+            if life.empty:
+                self.missing.append(f"{search} on {robot}")
+                continue
+            columns = life.error, 1000 * life.seconds / life.movements, life.movements_then, life.error_then
+            error, ms, movements, error_then = map(interquartile_mean, columns)
+            first, over, over_then = robot, f"{error:.3g}", f"{error_then:.3g}"
+            if search != SEARCHES[0]:
+                first = ""
+                over = self.cell(self.evidence.over, life.error, usual.error, form=".2f", between=True)
+                over_then = self.cell(self.evidence.over, life.error_then, usual.error_then, form=".2f", between=True)
+            rows.append([first, f"`{search}`", over, f"{ms:.1f}", f"{movements:.0f}", over_then])
+        head = ("robot", "search", "error, equal movements", "ms", "movements, equal time", "error, equal time")
         return markdown(head, rows)
 
     def asking(self) -> str:

@@ -38,12 +38,16 @@ TABLES: Final[dict[str, tuple[int, tuple[str, ...]]]] = {
     "rivals.csv": (4, ("rival", "setting", "seed", "movements", "linear", "process")),
     "random.csv": (3, ("number", "learner", "movements", "error", "noticed")),
     "model_files.csv": (3, ("file", "outcome", "options", "version", "told", "words", "practice", "random", *_RATIO)),
+    "refinement.csv": (
+        3,
+        ("robot", "seed", "search", "movements", "seconds", "error", "movements_then", "seconds_then", "error_then"),
+    ),
     "changes.csv": (5, ("robot", "change", "learner", "seed", "movements", "error", "noticed")),
 }
 TYPES: Final = {  # types of columns; all other columns have floats, and an empty field is NaN
-    **dict.fromkeys(("number", "seed", "movements", "tiles", "noticed", *_ASKED), "int64"),
-    **dict.fromkeys(("variant", "task", "answer", "teacher", "rival", "setting", "learner", "robot", "change"), "str"),
-    **dict.fromkeys(("file", "outcome", "options", "version", "told", "words"), "str"),
+    **dict.fromkeys(("number", "seed", "movements", "movements_then", "tiles", "noticed", *_ASKED), "int64"),
+    **dict.fromkeys(("variant", "task", "answer", "teacher", "rival", "setting", "learner"), "str"),
+    **dict.fromkeys(("robot", "change", "search", "file", "outcome", "options", "version", "told", "words"), "str"),
     **dict.fromkeys(("goals", "near"), "Int64"),  # with empty fields
 }
 LATE: Final = 1000  # number of movements after which requests count as late: the learner should know whom to ask

@@ -103,7 +103,7 @@ record: NaN is kept as a number | record/layout.py | record/test_record.py
 record: the last rows come first | record/__init__.py | record/test_record.py
     ORDER BY rowid LIMIT ==> ORDER BY -rowid LIMIT
 replay: another theta is accepted | record/replay.py | learner/test_life.py
-    if not box.same(recorded, now): ==> if now is recorded:
+    and not box.same(recorded, now): ==> and now is recorded:
 replay: another demonstration is accepted | record/replay.py | learner/test_life.py
     if not same: ==> if same is None:
 random streams: of a name only the first letter counts | spaces.py | test_spaces.py

@@ -133,12 +133,13 @@ class OwnGoals:
 
     def add(self, index: int, goal: Array, outcome: Array) -> None:
         """Count the movement with the number ``index``, which had an outcome."""
-        place, last = self._seen.get(goal.tobytes(), (0, -self.at_once - 1))
+        key = goal.tobytes()
+        place, last = self._seen.get(key, (0, -self.at_once - 1))
         if index - last > self.at_once:
             place = len(self.begun)
             self.begun.append(index)
             self.missed.append(np.inf)
-        self._seen[goal.tobytes()] = place, index
+        self._seen[key] = place, index
         self.missed[place] = min(self.missed[place], math.dist(outcome, goal))
 
     def recent_misses(self, movements: int) -> Array:

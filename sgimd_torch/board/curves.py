@@ -29,7 +29,7 @@ class Behaviour:
 
     def __init__(self, tolerance: float, at_once: int = 1) -> None:
         self.tolerance, self.own, self._movements = tolerance, OwnGoals(at_once), 0
-        self.points: list[Array] = []  # context and goal, a point of C x T, for each goal of ``own``
+        self.points: list[tuple[Array, Array]] = []  # context and goal, for each goal of ``own``
         self._since: Counter[str] = Counter()  # number of movements since the last point, by tag
         self._imitated: list[float] = []  # distances missed by imitations since the last point
         self._demonstrations = self._answered = 0
@@ -50,7 +50,7 @@ class Behaviour:
         elif move.origin != "global":
             self.own.add(episode.index, move.goal, episode.outcome)
             if len(self.points) < len(self.own.missed):
-                self.points.append(np.append(episode.context, move.goal))
+                self.points.append((episode.context, move.goal))
 
     def curves(self) -> dict[str, float]:
         """Values of the curves by tag: shares and means since the last call, counts since the first movement."""

@@ -125,7 +125,8 @@ class BoardListener(EventFile):
             self._scalars({**self._behaviour.curves(), **region_curves(regions)})
             if not replayed:
                 self._scalars({f"time/{name.removeprefix('seconds_')}": s for name, s in self._seconds().items()})
-        self._scalars(self._curves())
+        if curves := self._curves():
+            self._scalars(curves)
         for change in self._learner.changes[self._changes :]:
             self.add(self._movements, summary.text("about/changes", str(change)))
         self._changes = len(self._learner.changes)

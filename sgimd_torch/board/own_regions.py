@@ -36,8 +36,9 @@ class OwnRegions:
         if new.start >= new.stop:
             return
         self._n_added, problem, box = new.stop, self._problem, self._whole.box
-        points, missed_by = np.array(behaviour.points[new]), np.array(behaviour.own.missed[new])
-        far = np.linalg.norm(points[:, problem.contexts.dim :] - problem.rest, axis=1)
+        contexts, goals = map(np.array, zip(*behaviour.points[new], strict=True))
+        points, missed_by = np.hstack((contexts, goals)), np.array(behaviour.own.missed[new])
+        far = np.linalg.norm(goals - problem.rest, axis=1)
         competences = -np.minimum(1.0, missed_by / np.maximum(far, problem.tolerance))  # eq. (7)
         points = np.clip(points, box.low, np.nextafter(box.high, box.low))  # goals outside T count at its border
         leaves = []

@@ -106,7 +106,7 @@ def competence_map(ax: Axes, lows: Array, highs: Array, competences: Array, sect
     low = min(np.floor(least / step) * step, -step)
     span = low, max(np.ceil(most / step) * step, low + step)
     drawn = _regions_in(ax, lows, highs, np.ma.masked_invalid(competences), section, "viridis", span)
-    colour_bar(ax, drawn, "mean competence")
+    colour_bar(ax, drawn, "competence")
     section.frame(ax)
     return drawn
 

@@ -247,7 +247,6 @@ class ForwardModel(LightningModule):
         means, variances = (tensor.cpu().double().numpy() for tensor in members)
         return Prediction(means.mean(axis=0), means.std(axis=0), np.sqrt(variances.mean(axis=0)))
 
-    @one_thread()
     def refresh(self, memory: Memory) -> Refresh | None:
         """Learn from new and old exemplars in ``memory``; None if fewer than ``every`` exemplars are new, or all
         outcomes are equal.
@@ -280,6 +279,12 @@ class ForwardModel(LightningModule):
             return None
         if not seen and not np.ptp(memory.outcomes, axis=0).any():  # no movement has had an effect yet
             return None
+        return self._learn(memory, seen)
+
+    @one_thread()
+    def _learn(self, memory: Memory, seen: int) -> Refresh:
+        """Learn from all exemplars in ``memory``; the model has learnt from the first ``seen`` before."""
+        n = len(memory)
         for test in self.before_learning if seen else ():
             test(memory, seen)
         self._online.prepare()  # weights must be on the device before the exemplars

@@ -176,15 +176,16 @@ def _check_move(learner: Learner, event: Event, index: int, move: Move | None, e
     problem = learner.problem
     if event.goal is not None:
         _check_repeats(problem.outcomes, index, "goal", event.goal, move.goal)
-    if exact:
+    differs = bool((event.theta != move.theta).any())
+    if exact and differs:
         _check_repeats(problem.policies, index, "theta", event.theta, move.theta)
-    return not np.array_equal(event.theta, move.theta)
+    return differs
 
 
 def _check_repeats(box: Box, index: int, name: str, recorded: Array, now: Array | None) -> None:
     if now is None:
         raise ReplayError(f"movement {index} was recorded with a {name}, the learner now has none; {_HINT}")
-    if not box.same(recorded, now):
+    if (recorded != now).any() and not box.same(recorded, now):
         k = int(np.argmax(np.abs(recorded - now) / box.sides))
         raise ReplayError(
             f"movement {index} was recorded with another {name}: {name}_{k} was {recorded[k]}, now {now[k]}; "

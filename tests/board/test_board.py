@@ -49,12 +49,12 @@ def evaluation(errors):
     return Evaluation(errors, nothing, nothing, np.full(len(errors), 0.01), nothing, errors < 0, unknown)
 
 
-def interest_map(n=400, space=PLANE):
-    goals = InterestMap(problem(outcomes=space))
+def interest_map(n=400, space=PLANE, context=(), worst=-1.0):
+    goals = InterestMap(problem(contexts=Box.cube(-1, 1, len(context)), outcomes=space))
     rng = stream(0, "competence")
     for _ in range(n):
-        goal = goals.sample([])
-        goals.add([], goal, -rng.random() if goal[0] > 0 else -0.1)
+        goal = goals.sample(context)
+        goals.add(context, goal, worst * rng.random() if goal[0] > 0 else -0.1)
     return goals
 
 
@@ -170,10 +170,14 @@ def test_the_names_of_regions_lie_where_they_are_and_are_those_of_the_curves():
         assert any((r.low <= [x, y]).all() and ([x, y] <= r.high).all() for r in named[path])
 
 
-@pytest.mark.parametrize("high", [(1.0, 1.0), (4.0, 0.8), (0.7, 0.98)])
-def test_pictures_tell_small_errors_apart_and_cut_off_no_label(high):
+@pytest.mark.parametrize(
+    ("high", "context", "worst"),
+    [((1.0, 1.0), (), -1.0), ((4.0, 0.8), (), -1.0), ((4.0, 1.73), (0,), -0.6), ((0.7, 0.98), (), -1.0)],
+)
+def test_pictures_tell_small_errors_apart_and_cut_off_no_label(high, context, worst):
     space = Box(np.array([-0.3, -0.42]), np.array(high), ("tip x", "tip y"), "m")
-    goals, regions = space.low + space.sides * stream(0, "goals").random((4, 2)), interest_map(space=space).regions
+    goals = space.low + space.sides * stream(0, "goals").random((4, 2))
+    regions = interest_map(space=space, context=context, worst=worst).regions
     drawn = {}
     for error in (0.01, 0.02, 0.2):
         maps = pictures.maps_of(regions, space, goals, np.array([0.0, error, error, error]))

@@ -1,15 +1,17 @@
 """The pages of results: made of rows and templates alone, every row for a page, what is missing named."""
 
 import re
-from itertools import chain
+from itertools import chain, count
 from pathlib import Path
 
 import pytest
 
 import claims
+import refinement
 from claims import PAGES, README, TEMPLATES, filled, main
 from evidence import LAST, Evidence
 from made_up import write, write_rows
+from refinement import TABLE
 from runs import ROOT
 from sgimd_torch.options.command_line import parse
 from sgimd_torch.runs.signals import command
@@ -17,6 +19,7 @@ from table import read_table
 from variants import VARIANTS
 
 SHIPPED = ROOT / "results"
+ROBOT = "planar-arm-7 by process"
 CONSTANTS = {  # of the method, and of what no rows are kept of
     *("95 %", "50 %", "30 %", "2 %", ".25", ".05", ".95"),
     "1.6",  # seconds of refining
@@ -137,3 +140,29 @@ def test_the_page_of_rivals_has_the_default_and_the_best_setting(tmp_path):
         "| `isoline` | `default` | 0.0700 | – |",
         "| `isoline` | `sd=0.01` | 0.0600 | 0.0800 |",
     ]
+
+
+def test_the_page_of_searches_has_errors_over_those_of_the_simplex_and_the_cost_of_each(tmp_path):
+    rows = [
+        (ROBOT, seed, search, 200, ms * 0.2, error, made, 0.4, 2 * error)
+        for search, ms, made, error in (("nelder-mead", 2, 200, 0.1), ("gradient", 8.04, 50, 0.05))
+        for seed in (1000, 1001)
+    ]
+    write(write_rows(tmp_path), rows, TABLE)
+    text, page = filled("FORWARD_MODEL", Evidence.of(tmp_path), tmp_path)
+    usual = f"| {ROBOT} | `nelder-mead` | 0.1 | 2.0 | 200 | 0.2 |"
+    assert f"{usual}\n|  | `gradient` | 0.50 | 8.0 | 50 | 0.50 |\n" in text
+    assert f"gradient-then-nelder-mead on {ROBOT}" in page.missing
+
+
+def test_searches_side_by_side_have_the_lives_that_each_has_alone(monkeypatch):
+    monkeypatch.setattr(refinement, "WARM", 1)
+    ticks = count()  # every movement takes as long, so equal time is equal movements
+    rows = refinement.trio(ROBOT, 3, movements=120, clock=lambda: next(ticks))
+    alone = refinement.Life({**refinement.ROBOTS[ROBOT], "search": "gradient", "seed": 3}, 120, lambda: 0)
+    for _ in range(120):
+        alone.move()
+    assert rows["gradient"] == (120, 120, alone.now()[2], 119, 119, rows["gradient"][-1])
+    assert [row[:2] for row in rows.values()] == [(120, 120)] * 3
+    assert [row[3:5] for row in rows.values()] == [(120, 120), (119, 119), (119, 119)]
+    assert len({row[2] for row in rows.values()}) == 3

@@ -212,7 +212,6 @@ def test_a_module_is_copied_with_its_weights_and_members_of_a_class_differ():
     assert torch.equal(torch.random.get_rng_state(), before)
 
 
-@pytest.mark.filterwarnings("ignore::FutureWarning", "ignore:.*does not have many workers")  # of Lightning
 @pytest.mark.parametrize("network", [None, Own])
 def test_a_plain_trainer_fits_it_saves_it_and_a_checkpoint_loads_it_as_it_was_made(tmp_path, network):
     own = {} if network is None else {"network": network}

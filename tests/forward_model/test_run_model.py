@@ -21,6 +21,7 @@ from sgimd_torch.forward_model.model import ForwardModel
 from sgimd_torch.forward_model.shared import ModelListener
 from sgimd_torch.memory import Memory
 from sgimd_torch.options.build import build
+from sgimd_torch.options.catalogue import WORDS
 from sgimd_torch.options.command_line import main
 from sgimd_torch.options.config import Config
 from sgimd_torch.record import Record, ReplayError, layout
@@ -239,13 +240,16 @@ def test_a_model_that_differs_on_the_same_device_is_refused_with_what_differs(el
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("algorithm", ["practice", "sgim-d"])
+@pytest.mark.parametrize("algorithm", WORDS["algorithm"])
 def test_the_number_of_threads_does_not_change_a_life(tmp_path, algorithm):
-    short = f"run --algorithm {algorithm} --movements 600 --evaluate-at [] --inverse model-alone --search gradient"
+    known = Config(algorithm=algorithm).defaults
+    parts = {"inverse": "model-alone", "search": "gradient"}
+    words = [f"--{name}={word}" for name, word in parts.items() if name in known]
+    short = f"run --algorithm {algorithm} --movements 600 --evaluate-at []"
     for threads in "12":
         chosen = {f"{library}_NUM_THREADS": threads for library in ("OMP", "OPENBLAS", "MKL")}
-        words = [sys.executable, "-m", "sgimd_torch", *short.split(), "--out", tmp_path / threads]
-        subprocess.run(words, check=True, env={**os.environ, "PYTHONPATH": str(ROOT), **chosen})
+        line = [sys.executable, "-m", "sgimd_torch", *short.split(), *words, "--out", tmp_path / threads]
+        subprocess.run(line, check=True, env={**os.environ, "PYTHONPATH": str(ROOT), **chosen})
     one, two = (content_of(tmp_path / threads / algorithm / "seed-000") for threads in "12")
     assert one == two
 

@@ -3,6 +3,8 @@
 import base64
 import io
 import re
+import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +13,13 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from pages import Page, rows_of
+from runs import write_about
 from sgimd_torch.figures.learning import COLOURS
 from sgimd_torch.options.command_line import main as live
 from sgimd_torch.options.config import words
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.signals import command
+from sgimd_torch.spaces import Box
 from sgimd_torch.views.report import paper, paper_figures
 from sgimd_torch.views.report.replication import Replication
 from sgimd_torch.views.variants import Variant
@@ -108,6 +112,15 @@ def test_numbers_are_those_of_the_runs(page, study):
     assert study.large().rows[2][1:] == (f"{errors['sgim-d']:.3f}", f"{errors['sgim-d-large']:.3f}", f"{ratio:.2f}")
 
 
+def test_a_large_t_of_the_page_is_no_warning_and_other_remarks_are(tiny, tmp_path):
+    out = shutil.copytree(tiny[0], tmp_path / "paper")
+    plan = {name: replace(config, out=out) for name, config in tiny[2].items()}
+    for name in ("random", "sgim-d-large"):
+        write_about(plan[name].directory, remarks={"narrow": f"{name} is told"})
+    told = Page(paper.page(plan, [0])).all("li")
+    assert [text.rpartition(": ")[2] for text in told if text.endswith("told.")] == ["random is told."]
+
+
 def test_only_demonstrator_3_moves_each_joint_in_one_direction(study):
     assert [row[3] == "100%" for row in study.monotonic().rows] == [False, False, True]
 
@@ -144,3 +157,9 @@ def test_curves_have_the_colours_of_their_learners_and_histograms_one_scale(stud
     whole, near = drawn(paper_figures.goals, study).axes[:2]
     assert len(whole.lines[0].get_xdata()) == len(study.chosen("sagg-riac"))
     assert near.get_xlim() == (-100, 100)
+
+
+@pytest.mark.parametrize(("most", "n_axes"), [(1e-9, 2), (100, 4)])
+def test_goals_in_the_papers_t_are_drawn_if_there_are_any(study, monkeypatch, most, n_axes):
+    monkeypatch.setattr(paper_figures, "SMALL", Box.cube(-most, most, 2))
+    assert len(drawn(paper_figures.goals, study).axes) == n_axes

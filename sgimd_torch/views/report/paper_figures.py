@@ -135,15 +135,16 @@ def parameters(figure: Figure, study: Replication) -> None:
 
 @png
 def goals(figure: Figure, study: Replication) -> None:
-    """Goals that SAGG-RIAC and SGIM-D chose in the large T; below, those in the paper's T."""
-    figure.set_size_inches(8.6, 8.2)
-    axes = figure.subplots(2, 2)
-    for column, name in zip(axes.T, THREE[1:], strict=True):
-        chosen, box = study.chosen(name), study.variants[f"{name}-large"].space
-        for ax, part in zip(column, (box, SMALL), strict=True):
-            inside = chosen[part.contains(chosen)]
+    """Goals that SAGG-RIAC and SGIM-D chose in the large T; below, those in the paper's T, if there are any."""
+    chosen = {name: study.chosen(name) for name in THREE[1:]}
+    parts = [study.variants["sgim-d-large"].space, SMALL]
+    shown = [part for part in parts if any(part.contains(goals).any() for goals in chosen.values())]
+    figure.set_size_inches(8.6, 4.1 * len(shown))
+    for column, (name, goals) in zip(figure.subplots(len(shown), 2, squeeze=False).T, chosen.items(), strict=True):
+        for ax, part in zip(column, shown, strict=True):
+            inside = goals[part.contains(goals)]
             ax.plot(*inside.T, ".", color=COLOURS[name], markersize=6, alpha=0.6, markeredgewidth=0)
-            title = f"{NAMES[name]}: {len(inside)} of {len(chosen)} goals"
+            title = f"{NAMES[name]}: {len(inside)} of {len(goals)} goals"
             ax.set(title=title, xlabel="x (m)", ylabel="y (m)", aspect="equal")
             ax.set(xlim=(part.low[0], part.high[0]), ylim=(part.low[1], part.high[1]))
 
