@@ -13,11 +13,12 @@ from typing import Final, NamedTuple
 import numpy as np
 from numba import float64, njit
 
-from sgimd_torch.memory.jit import LISTS, NUMBERS, ROWS, TABLE, as_columns, compiled_for, jit_helper, squared_distance
+from sgimd_torch.memory.jit import LISTS, NUMBERS, TABLE, as_columns, compiled_for, jit_helper, squared_distance
 from sgimd_torch.spaces import Array
 
 STEPS: Final = 4  # largest number of Gauss-Newton steps from each start
-STARTS: Final = 3  # number of exemplars where steps begin
+STARTS: Final = 6  # number of exemplars where steps begin, each with a process of its own
+JUDGED: Final = 20  # number of movements most like a start, on which the surprise of its process is measured
 DAMPINGS: Final = (1e-3, 0.1, 1.0, 10.0)  # all tried in each step, relative to the mean diagonal of J J^T
 GROSS: Final = 9.0  # squared residual, relative to the usual one, from which on an exemplar is a gross error
 DETERMINED: Final = 0.5  # variance of an outcome given all others, relative to the kernel's, below which they judge it
@@ -273,25 +274,8 @@ def descend(
     return least, best
 
 
-@jit_helper
-def rows_to_fit(near: np.ndarray, alike: np.ndarray, n: int) -> np.ndarray:
-    """Rows ``(k,)`` that a process is fitted to: those of the lists ``alike`` ``(lists, k)``, nearest first in each, by
-    turns, and at the end those ``near`` the goal. No list has a -1; ``n`` is the number of movements in memory."""
-    rows, unused = np.empty(alike.shape[1], np.int64), np.ones(n, np.bool_)
-    for j in range(len(near)):  # a slice would compile for 2 s
-        rows[len(rows) - len(near) + j], unused[near[j]] = near[j], False
-    count = 0
-    for i in range(alike.shape[1]):
-        for row in alike[:, i]:
-            if unused[row] and count < len(rows) - len(near):
-                rows[count], unused[row] = row, False
-                count += 1
-    return rows
-
-
-@compiled_for(ROWS, LISTS, TABLE, TABLE, TABLE, NUMBERS, NUMBERS, NUMBERS, NUMBERS, TABLE, NUMBERS, TABLE)
+@compiled_for(LISTS, TABLE, TABLE, TABLE, NUMBERS, NUMBERS, NUMBERS, NUMBERS, TABLE, NUMBERS, TABLE)
 def answer(
-    near: np.ndarray,
     alike: np.ndarray,
     inputs: Array,
     thetas: Array,
@@ -304,13 +288,15 @@ def answer(
     spreads: Array,
     box: Array,
 ) -> tuple[Array, Array, float]:
-    """theta of the candidate with the least expected squared error, its expected outcome, and the standard deviation
-    from that, noise included. Candidates are the exemplars near the goal, the ends of steps from three of them, and the
-    answer of `LocallyLinear`.
+    """theta of the candidate with the least expected squared error, noise included, its expected outcome, and the
+    standard deviation from that.
+
+    Each start has a process of its own, of the movements most like it, and with it a variance and a noise of its own.
+    So a slow movement is preferred to a fast one that cannot be repeated. Candidates are each start, the end of steps
+    from it, and the answer of `LocallyLinear`, judged by the process of the first start.
 
     Args:
-        near: ``(n_near,)`` rows of the nearest outcomes, nearest first.
-        alike: ``(lists, k)`` rows of the movements most like the first of these, one list for each; k > n_near.
+        alike: ``(starts, k)``, rows of the movements most like each start, the start itself first.
         inputs: ``(n, dim)``, all movements in memory, in lengths.
         thetas, outcomes: ``(n, theta_dim)`` and ``(n, outcome_dim)``, all movements in memory.
         context, goal: question.
@@ -320,38 +306,41 @@ def answer(
         spreads: ``(theta_dim,)``, standard deviation of each parameter in memory, the unit of the steps.
         box: ``(2, theta_dim)``, corners of the box around all thetas.
     """
-    rows, m = rows_to_fit(near, alike, len(thetas)), len(goal)
-    first = len(rows) - len(near)
-    process = fitted_process(as_columns(inputs, rows), as_columns(outcomes, rows), kernel)
-    precision = precisions(process.factor, len(near))
-    surprise = 0.0  # mean squared residual near the goal
-    for j in range(len(near)):
-        surprise += squared_residual(process, first + j, precision[j]) / len(near)
-    inflation = m * max(1.0, surprise)
-    covariance, slope = np.empty(len(rows)), np.empty(len(rows))
-    least, best = np.inf, linear
-    for j in range(len(near)):
+    m, k = len(goal), alike.shape[1]
+    n_judged = min(JUDGED, k)
+    covariance, slope = np.empty(k), np.empty(k)
+    least, best, outcome, sd = np.inf, linear, goal, 0.0
+    for start in range(len(alike)):
+        rows = alike[start, ::-1].copy()  # the start is the last row, as `precisions` wants
+        process = fitted_process(as_columns(inputs, rows), as_columns(outcomes, rows), kernel)
+        precision = precisions(process.factor, n_judged)
+        surprise = 0.0  # mean squared residual near the start
+        for j in range(n_judged):
+            surprise += squared_residual(process, k - n_judged + j, precision[j]) / n_judged
+        inflation = m * max(1.0, surprise)
+        scatter = inflation * process.variance * kernel[3]
+        row, theta = rows[-1], thetas[rows[-1]]
         if len(context):
-            covariances(process.inputs, kernel, in_lengths(thetas[near[j]], context, scaling), covariance, slope)
-            error = expected_error(process, goal, inflation, covariance, least)
+            covariances(process.inputs, kernel, in_lengths(theta, context, scaling), covariance, slope)
+            error = expected_error(process, goal, inflation, covariance, np.inf)
         else:  # posterior of its outcome without noise, given itself and all others
-            noise = process.noises[first + j]
-            error = inflation * process.variance * noise * max(1 - noise * precision[j], 0.0)
-            for k in range(m):
-                error += (outcomes[near[j], k] - noise * process.weights[k, first + j] - goal[k]) ** 2
-        if error < least:
-            least, best = error, thetas[near[j]]
-    covariances(process.inputs, kernel, in_lengths(linear, context, scaling), covariance, slope)
-    error = expected_error(process, goal, inflation, covariance, least)
-    if error < least:
-        least, best = error, linear
-    for row in near[:STARTS]:
-        error, theta = descend(process, thetas[row], context, goal, inflation, scaling, spreads, box)
-        if error < least:
-            least, best = error, theta
-    best = best.copy()
-    outcome, variance = prediction(process, in_lengths(best, context, scaling))
-    return best, outcome, np.sqrt(max(1.0, surprise) * (variance + process.variance * kernel[3]))
+            noise = process.noises[-1]
+            error = inflation * process.variance * noise * max(1 - noise * precision[-1], 0.0)
+            for i in range(m):
+                error += (outcomes[row, i] - noise * process.weights[i, -1] - goal[i]) ** 2
+        if start == 0:
+            covariances(process.inputs, kernel, in_lengths(linear, context, scaling), covariance, slope)
+            error_of_linear = expected_error(process, goal, inflation, covariance, error)
+            if error_of_linear < error:
+                error, theta = error_of_linear, linear
+        error_of_end, end = descend(process, thetas[row], context, goal, inflation, scaling, spreads, box)
+        if error_of_end < error:
+            error, theta = error_of_end, end
+        if error + scatter < least:
+            least, best = error + scatter, theta.copy()
+            outcome, variance = prediction(process, in_lengths(best, context, scaling))
+            sd = np.sqrt(max(1.0, surprise) * (variance + process.variance * kernel[3]))
+    return best.copy(), outcome.copy(), sd
 
 
 @compiled_for(TABLE, TABLE, LISTS, TABLE, NUMBERS)

@@ -1,9 +1,9 @@
 """Local Gaussian process as inverse model; the answer is the candidate with the least expected error.
 
-Our addition, not in the paper. The process is fitted to movements near the goal and to movements like them. Candidates
-are the exemplars near the goal, the ends of Gauss-Newton steps from them, and the answer of `LocallyLinear`. Each
-candidate has an expected squared error, variance included. Where the process predicted exemplars near the goal badly,
-its variance is inflated.
+Our addition, not in the paper. Each of the exemplars nearest to the goal has a process of its own, fitted to the
+movements most like it. Candidates are these exemplars, the ends of Gauss-Newton steps from them, and the answer of
+`LocallyLinear`. Each candidate has an expected squared error, variance and noise included. Where a process predicts the
+exemplars most like its own badly, both are inflated.
     inverse = LocalProcess(problem); estimate = inverse(context, goal)
 """
 
@@ -27,8 +27,7 @@ _GROWTH: Final = 1.5  # factor of the number of exemplars from fit to fit
 _FITTED: Final = 300  # number of exemplars, drawn from all, to which lengths are fitted
 _GROUPS: Final = 8  # number of groups of neighbours that determine the kernel
 _GROUP: Final = 60  # number of exemplars in each group
-_NEAR: Final = 20  # number of exemplars nearest to the goal, on which the surprise of the process is measured
-_MOST_ALIKE: Final = 100  # number of exemplars to which the process is fitted, the `_NEAR` ones among them
+_MOST_ALIKE: Final = 100  # number of exemplars to which a process is fitted
 _FAR: Final = 1e3  # distance from 0, in standard deviations, beyond which inputs are shifted to 0 against rounding
 
 
@@ -81,15 +80,14 @@ class LocalProcess(Inverse):
     def _answer(self, context: Array, goal: Array) -> Estimate:
         memory = self.memory
         self._catch_up()
-        near = near_goal(memory, context, goal, _NEAR)
+        near = near_goal(memory, context, goal, NEAR)
         thetas = memory.thetas[near]
         if self._kernel is None:
             return Estimate(thetas[0], thetas, memory.outcomes[near], context)
-        linear, _ = self._linear.correct(near[:NEAR], goal)
+        linear, _ = self._linear.correct(near, goal)
         inputs, kernels = self._inputs.keys.rows, compiled("sgimd_torch.inverses.kernels")
         alike = self._inputs.nearest(inputs[near[: kernels.STARTS]], _MOST_ALIKE)
         theta, expected, sd = kernels.answer(
-            near,
             alike,
             inputs,
             memory.thetas,
