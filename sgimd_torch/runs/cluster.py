@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Final
 
 from sgimd_torch.options.config import Config, words
-from sgimd_torch.runs.parallel import PATIENCE, POLL, log_of, start_process, stop_processes
+from sgimd_torch.runs.parallel import PATIENCE, POLL, Machine, log_of, start_process
 from sgimd_torch.runs.read import movements_on_disk
 from sgimd_torch.runs.signals import Failed, say
 
@@ -36,12 +36,13 @@ import os, sys, threading
 threading.Thread(target=lambda: os.read(0, 1) or os._exit(1), daemon=True).start()
 from sgimd_torch.__main__ import main
 sys.exit(main())"""
+LEAVING: Final = (Status.closing, Status.closed)  # a worker that does so can wait for a run only for a moment
 TERMINATED: Final = (-signal.SIGTERM, 128 + signal.SIGTERM)  # exit codes of a run that was told to stop
 UNDER_WAY: Final = set[str]()  # keys of the tasks whose runs have a process on this worker
 
 
 class Cluster:
-    """A Dask cluster; how many runs it makes at a time is its own matter.
+    """A Dask cluster, which is given all runs at once.
 
     Args:
         place: address of the scheduler, or path of the file that ``dask scheduler --scheduler-file`` writes.
@@ -55,10 +56,10 @@ class Cluster:
     def __init__(self, place: str) -> None:
         for name in ("distributed", "distributed.client"):  # each has its own handler
             logging.getLogger(name).setLevel(logging.CRITICAL)
-        found = {"scheduler_file" if Path(place).is_file() else "address": place}
         try:
-            if "address" in found:
-                get_address_host_port(place)  # a client without a port would wait for ever
+            if not (is_file := Path(place).is_file()):
+                get_address_host_port(place)  # a client of an address without a port would wait for ever
+            found = {"scheduler_file" if is_file else "address": place}
             self.client = Client(**found, timeout=CONNECT, set_as_default=False)
         except (OSError, ValueError) as error:
             raise ValueError(f"no Dask scheduler answers at {place}; `dask scheduler` starts one ({error})") from error
@@ -68,9 +69,9 @@ class Cluster:
         return Task(self.client, config)
 
     def stop(self, runs: Sequence[Task]) -> None:
+        keys, deadline = {run.future.key for run in runs}, time.monotonic() + PATIENCE
         if self.client.status == "running":
-            self.client.cancel([task.future for task in runs])
-            keys, deadline = {task.future.key for task in runs}, time.monotonic() + PATIENCE
+            self.client.cancel([run.future for run in runs])
             while keys and time.monotonic() < deadline:
                 time.sleep(POLL)
                 keys &= {*chain(*self.client.run(under_way, on_error="ignore").values())}
@@ -78,11 +79,10 @@ class Cluster:
 
 
 class Task:
-    """A run that the cluster was given, like a ``subprocess.Popen``."""
+    """A run that the cluster was given."""
 
     def __init__(self, client: Client, config: Config) -> None:
-        self.config, self.returncode = config, 0
-        log = os.path.abspath(log_of(config))
+        self.config, self.returncode, log = config, 0, os.path.abspath(log_of(config))
         self._submit = partial(client.submit, carry_out, words(config), log, os.getcwd(), pure=False)
         self._hand_over()
 
@@ -107,37 +107,24 @@ class Task:
                 return None
             self.returncode = -signal.SIGKILL
         except Exception as error:
-            needs = "it needs this package and this folder, as on this machine"
-            raise Failed(f"a worker cannot start {self.config.title}; {needs} ({error})") from error
+            raise Failed(f"a worker cannot start runs; has it this package and this folder? ({error})") from error
         return self.returncode
 
 
 def carry_out(options: Sequence[str], log: str, folder: str) -> int:
-    """Make a run on a worker, and return its exit code.
-
-    Args:
-        options: options of ``sgimd run``.
-        log: file of its output.
-        folder: working directory of the run.
+    """Make a run on a worker, by these options of ``sgimd run`` in this folder, and return its exit code.
 
     Raises:
         Reschedule: the run was stopped, but not by the sweep: another worker continues it.
     """
     worker = get_worker()
-    key = worker.get_current_task()
-    task = worker.state.tasks[key]
+    task = worker.state.tasks[worker.get_current_task()]
     process = start_process(["-c", HELD], options, Path(log), stdin=subprocess.PIPE, folder=folder)
-    UNDER_WAY.add(key)
-    try:
-        while (
-            process.poll() is None
-            and task.state != "cancelled"
-            and worker.status not in (Status.closing, Status.closed)
-        ):
-            time.sleep(POLL)
-    finally:
-        stop_processes([process])
-        UNDER_WAY.discard(key)
+    UNDER_WAY.add(task.key)
+    while process.poll() is None and task.state != "cancelled" and worker.status not in LEAVING:
+        time.sleep(POLL)
+    Machine.stop([process])
+    UNDER_WAY.remove(task.key)
     if process.returncode in TERMINATED and task.state != "cancelled":
         raise Reschedule
     return process.returncode

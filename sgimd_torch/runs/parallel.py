@@ -14,7 +14,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Final, Protocol, TypeVar
+from typing import Any, Final, Protocol
 
 from sgimd_torch.files import make_folder
 from sgimd_torch.options.config import Config, words
@@ -28,49 +28,40 @@ PATIENCE: Final = 20.0  # s for stopped runs to save their movements; a run kill
 Process = subprocess.Popen[bytes]
 
 
-class Started(Protocol):
-    """A run under way, like a ``subprocess.Popen``."""
+class Engine(Protocol):
+    """What carries out runs: this machine, or a cluster. A run has ``poll`` and ``returncode``, as ``Process``."""
 
-    returncode: int
+    at_once: float  # most runs under way at a time
 
-    def poll(self) -> int | None:
-        """The exit code, also in ``returncode``; None if the run has not ended."""
+    def start(self, config: Config) -> Any:
+        """Start or resume a run; its output is appended to its log."""
 
-
-Run = TypeVar("Run", bound=Started)
-
-
-class Engine(Protocol[Run]):
-    """What carries out runs: this machine, or a cluster."""
-
-    at_once: float  # most runs to start before one has ended
-
-    def start(self, config: Config) -> Run:
-        """Start or resume a run, whose output is appended to its log."""
-
-    def stop(self, runs: Sequence[Run]) -> None:
-        """The sweep ends: stop these runs, which get some time to save their movements."""
+    def stop(self, runs: Sequence[Any]) -> None:
+        """Stop runs, which get some time to save their movements; no run is started later."""
 
 
 class Machine:
     """This machine; at most ``processes`` runs at a time."""
 
-    def __init__(self, processes: int) -> None:
-        self.at_once: float = processes
+    def __init__(self, processes: float) -> None:
+        self.at_once = processes
 
     def start(self, config: Config) -> Process:
         return start_process(["-m", "sgimd_torch"], words(config), log_of(config), stdin=subprocess.DEVNULL)
 
-    def stop(self, runs: Sequence[Process]) -> None:
-        stop_processes(runs)
+    @staticmethod
+    def stop(processes: Sequence[Process]) -> None:
+        """Stop runs; they get some time to save their movements."""
+        for process in processes:
+            process.terminate()
+        deadline = time.monotonic() + PATIENCE
+        for process in processes:
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(max(0.0, deadline - time.monotonic()))
+            process.kill()
 
 
-def sweep(
-    configs: Sequence[Config],
-    engine: Engine[Run],
-    *,
-    on_end: Callable[[Config], None] | None = None,
-) -> list[str]:
+def sweep(configs: Sequence[Config], engine: Engine, *, on_end: Callable[[Config], None] | None = None) -> list[str]:
     """Carry out runs in this order and show progress; a failed run does not stop the others.
 
     Args:
@@ -92,7 +83,7 @@ def sweep(
         raise ValueError(f"two runs would be written to {twice[0]}; their variants need different names")
     done = {config: _on_disk(config) for config in configs}
     failures: dict[Config, str] = {}
-    waiting, running = [*reversed(configs)], dict[Config, tuple[Run, int]]()
+    waiting, running = [*reversed(configs)], dict[Config, tuple[Any, int]]()
     bar = Progress("sweep", sum(config.movements for config in configs), sum(done.values()))
     with Stopping("stopping all runs; the same command continues them") as stopping, bar as progress:
         try:
@@ -136,7 +127,7 @@ def start_process(
         )
 
 
-def _wait(running: Mapping[Config, tuple[Run, int]], stopping: Stopping) -> list[Config]:
+def _wait(running: Mapping[Config, tuple[Any, int]], stopping: Stopping) -> list[Config]:
     """The runs that have ended, as soon as there is one; after ``REFRESH`` looks or a signal, perhaps none."""
     ended: list[Config] = []
     for _ in range(REFRESH):
@@ -145,17 +136,6 @@ def _wait(running: Mapping[Config, tuple[Run, int]], stopping: Stopping) -> list
         if ended or stopping.heard:
             break
     return ended
-
-
-def stop_processes(processes: Sequence[Process]) -> None:
-    """Stop runs; they get some time to save their movements."""
-    for process in processes:
-        process.terminate()
-    deadline = time.monotonic() + PATIENCE
-    for process in processes:
-        with suppress(subprocess.TimeoutExpired):
-            process.wait(max(0.0, deadline - time.monotonic()))
-        process.kill()
 
 
 def log_of(config: Config) -> Path:

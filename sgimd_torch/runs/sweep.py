@@ -26,7 +26,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from sgimd_torch.files import make_folder
 from sgimd_torch.options.command_line import parse
@@ -118,7 +118,7 @@ def add_options(parser: argparse.ArgumentParser, *, seeds: str | None, default: 
     parser.add_argument("--dry-run", action="store_true", help="list unfinished runs without starting them")
 
 
-def engine_of(options: argparse.Namespace) -> Engine[Any]:
+def engine_of(options: argparse.Namespace) -> Engine:
     """What carries out the runs, by the options of ``add_options``.
 
     Raises:
