@@ -27,7 +27,10 @@ def signal_another():  # once, as soon as a file names the process and the signa
         if os.path.exists(named + ".done"):
             return
         time.sleep(0.01)
-    os.rename(named, named + ".done")
+    try:
+        os.rename(named, named + ".done")
+    except FileNotFoundError:  # another run was faster
+        return
     signal_to(*map(int, open(named + ".done").read().split()))
 
 WAYS = {

@@ -5,6 +5,8 @@ The slow tests start schedulers and workers on this machine. They need the extra
 
 import os
 import re
+import shlex
+import shutil
 import signal
 import subprocess
 import sys
@@ -131,4 +133,65 @@ def test_ctrl_c_stops_the_runs_on_the_workers_and_the_same_cluster_continues_the
     assert "stopping all runs; the same command continues them" in said_by(sweep, 130)
     assert re.search(r"stopped after 1\d movements", (tmp_path / "random/seed-000.log").read_text())
     assert "2 runs ended well, 0 failed" in said_by(dask.sweep(), 0)
+    assert as_alone(odd, tmp_path, (0, 1))
+
+
+SLURM = [name for name in ("slurmctld", "slurmd", "munged", "sbatch") if shutil.which(name) is None]
+
+
+@pytest.fixture
+def slurm(tmp_path, monkeypatch):
+    """A Slurm of this machine; the result is a function that submits a job, and waits for its end."""
+    if SLURM or os.geteuid() != 0:
+        pytest.skip(
+            f"scripts/slurm needs root and Debian's slurmctld, slurmd, slurm-client and munge; missing: {SLURM}"
+        )
+    subprocess.run([ROOT / "scripts/slurm", "start"], check=True)
+    monkeypatch.setenv("SLURM_CONF", "/tmp/slurm-of-one/slurm.conf")
+
+    def submit(job, during):
+        with subprocess.Popen(["sbatch", "--wait", job], cwd=tmp_path) as submitted:
+            during(submitted)
+        return submitted.returncode
+
+    yield submit
+    subprocess.run([ROOT / "scripts/slurm", "stop"], check=True)
+
+
+@pytest.mark.slow
+def test_the_job_of_the_page_goes_on_after_scancel_and_after_its_time_limit(slurm, odd, tmp_path, monkeypatch):
+    page = (ROOT / "docs/clusters.md").read_text(encoding="utf-8")
+    (job,) = re.findall(r"```\n(#!/bin/bash\n.*?)```", page, re.DOTALL)
+    sweep = shlex.join([*ODD, *EVALUATED, "--seeds", "0-1"])
+    for ours, wanted in (
+        ("--ntasks=20", "--ntasks=2"),
+        ("--time=02:00:00", "--time=00:01:00"),  # the shortest one
+        ("TERM@120", "TERM@30"),
+        ("--vary goals=interest-map,uniform --seeds 0-499 --out study", f"{sweep} --out ."),
+    ):
+        assert ours in job
+        job = job.replace(ours, wanted)
+    (tmp_path / "study.sh").write_text(job)
+    (tmp_path / ".venv").symlink_to(sys.prefix)
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(odd), str(ROOT)]))
+    monkeypatch.setenv("AT_20", "signals another")
+    monkeypatch.setenv("ANOTHER", str(tmp_path / "another"))
+
+    def waiting(submitted):  # a run waits at its 20th movement
+        (tmp_path / "another.done").unlink(missing_ok=True)
+        (tmp_path / "another").write_text("0 0")  # no signal to another
+        while not (tmp_path / "another.done").exists():
+            assert submitted.poll() is None
+            time.sleep(0.1)
+
+    def cancelled(submitted):
+        waiting(submitted)
+        subprocess.run(["scancel", "--name", "study"], check=True)
+
+    for during in (cancelled, waiting):
+        assert slurm("study.sh", during) != 0
+        said = (tmp_path / "study.txt").read_text()
+        assert "stopping all runs; the same command continues them" in said
+        assert any(movements_on_disk(tmp_path / f"random/seed-00{seed}") in range(10, 40) for seed in (0, 1)), said
+    assert slurm("study.sh", lambda submitted: None) == 0, (tmp_path / "study.txt").read_text()
     assert as_alone(odd, tmp_path, (0, 1))
