@@ -199,7 +199,9 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
         "--only", nargs="+", default=[], metavar="VARIANT", help="variants to run (default: all of them)"
     )
     add_options(parser, seeds=None, default="seeds of the page of each experiment")
-    parser.add_argument("--all", action="store_true", help="lives of random robots and of robots that change, too")
+    parser.add_argument(
+        "--all", action="store_true", help="lives of random robots and of robots that change, too; on this machine"
+    )
     parser.add_argument("--out", type=Path, default=Path("runs"), help="folder of the runs (default: %(default)s)")
     parser.add_argument("--results", type=Path, default=Path("results"), help=results)
     parser.add_argument(

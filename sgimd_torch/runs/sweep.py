@@ -83,8 +83,9 @@ def run_all(whole: Sequence[Config], options: argparse.Namespace, out: Path) -> 
         from sgimd_torch.runs.directory import build_again, record_of  # imported here so that --help is fast
     for config in {config.directory.parent: config for config in left}.values():
         build_again(config, record_of(config))  # wrong options raise an error before any run starts
+    engine = engine_of(options)
     make_folder(out)
-    failures = sweep(left, engine_of(options))
+    failures = sweep(left, engine)
     say(f"{len(left) - len(failures)} runs ended well, {len(failures)} failed: {out}", *failures)
     return 1 if failures else 0
 

@@ -188,7 +188,11 @@ def test_the_readme_and_its_example_are_short_enough_to_read():
 
 
 def test_all_pages_together_can_be_read():
-    pages = [path for path in ROOT.rglob("*.md") if not {".venv", ".pytest_cache", "site", "build"} & set(path.relative_to(ROOT).parts)]
+    pages = [
+        path
+        for path in ROOT.rglob("*.md")
+        if not {".venv", ".pytest_cache", "site", "build"} & set(path.relative_to(ROOT).parts)
+    ]
     assert sum(len(path.read_text(encoding="utf-8").split()) for path in pages) <= 31_000
 
 

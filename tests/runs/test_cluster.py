@@ -34,15 +34,15 @@ def test_a_cluster_that_cannot_be_used_is_told_in_one_line(tmp_path, monkeypatch
         ("tcp://127.0.0.1:9", "no Dask scheduler answers at tcp://127.0.0.1:9; `dask scheduler` starts one"),
         ("head", "no Dask scheduler answers at head; .*missing port number"),
     ):
-        assert swept("--out", tmp_path, "--on", place) == 2
+        assert swept("--out", tmp_path / "study", "--on", place) == 2
         assert_last(capsys, said)
-    assert swept("--out", tmp_path, "--on", "head:8786", "--processes", 2) == 2
+    assert swept("--out", tmp_path / "study", "--on", "head:8786", "--processes", 2) == 2
     assert_last(capsys, "--processes cannot be given with --on: each worker")
     monkeypatch.delitem(sys.modules, cluster.__name__)
     monkeypatch.setitem(sys.modules, "distributed", None)
-    assert swept("--out", tmp_path, "--on", "head:8786") == 2
+    assert swept("--out", tmp_path / "study", "--on", "head:8786") == 2
     assert_last(capsys, r"--on needs distributed: pip install 'sgimd-torch\[cluster\]'")
-    assert not list(tmp_path.rglob("*.sqlite"))
+    assert not (tmp_path / "study").exists()
 
 
 def assert_last(capsys, said):
