@@ -32,7 +32,7 @@ with loading():  # Ctrl-C shows no traceback
     from sgimd_torch.record import RunError
     from sgimd_torch.runs.parallel import sweep
     from sgimd_torch.runs.read import finished, read_run
-    from sgimd_torch.runs.sweep import add_options
+    from sgimd_torch.runs.sweep import add_options, cores, engine_of
     from table import FILE, ROWS, Row, answers_of, merge, own_answer, read_table, result_rows
     from variants import EXPERIMENTS, MADE, SEEDS, SMALL_TABLES, Variant, make_subsets
 
@@ -44,7 +44,7 @@ examples:
   python experiments/compare.py --all --results mine              all rows of all pages again, into mine/
   python experiments/compare.py paper large --seeds 0-2 --results mine
   python experiments/compare.py rivals --only sgim-d-once cma-me --results mine      two variants, rows in mine/
-  python experiments/compare.py --shard 3/20                      a part of the runs, see docs/clusters.md
+  python experiments/compare.py --on tcp://head:8786              on a cluster, see docs/clusters.md
   python experiments/compare.py --verify 10 --lot 7               make ten random rows again, and compare
 
 Exit code: 0 all runs are in the tables, 1 some failed, 2 the request is wrong, 130 or 143 stopped by a signal.
@@ -61,15 +61,14 @@ def main(argv: Sequence[str] | None = None) -> int:
         The exit code: 1 if runs failed, else 0.
     """
     options = _options(argv)
-    whole = runs_of(options.experiments, options.only, options.seeds, options.out)
-    wanted = list(options.shard.of(whole))
+    wanted = runs_of(options.experiments, options.only, options.seeds, options.out)
     table = read_table(options.results)
     if options.verify:
         return verify(wanted, table, options)
     known = {*table[KEY].itertuples(index=False, name=None)}
     left = [config for config in wanted if not last_rows(config) <= known]
     where = options.results / FILE
-    say(f"{len(wanted)} runs{options.shard.note(whole)}, {len(wanted) - len(left)} of them in {where} already")
+    say(f"{len(wanted)} runs, {len(wanted) - len(left)} of them in {where} already")
     if wanted and not left:
         say("nothing is left to run: --verify 10 makes ten of these rows again, --results FOLDER makes all again")
     if options.dry_run:
@@ -81,8 +80,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         failures = _run(left, options, lambda config: collect(config, options.results))
         say(f"{len(left) - len(failures)} runs ended well, {len(failures)} failed: {where}", *failures)
     if options.all:
-        random_robots.make(options.results, options.processes)
-        changing.make(options.results, options.processes)
+        random_robots.make(options.results, options.processes or cores())
+        changing.make(options.results, options.processes or cores())
     return 1 if failures else 0
 
 
@@ -180,7 +179,7 @@ def collect(config: Config, results: Path) -> None:
 def _run(configs: Sequence[Config], options: argparse.Namespace, on_end: Any = None) -> list[str]:
     """Carry out runs; returns error messages, one for each failed run."""
     make_subsets(options.out / "demonstrations")
-    return sweep(configs, options.processes, on_end=on_end)
+    return sweep(configs, engine_of(options), on_end=on_end)
 
 
 def _in_words(row: Row) -> str:
@@ -200,7 +199,9 @@ def _options(argv: Sequence[str] | None) -> argparse.Namespace:
         "--only", nargs="+", default=[], metavar="VARIANT", help="variants to run (default: all of them)"
     )
     add_options(parser, seeds=None, default="seeds of the page of each experiment")
-    parser.add_argument("--all", action="store_true", help="lives of random robots and of robots that change, too")
+    parser.add_argument(
+        "--all", action="store_true", help="lives of random robots and of robots that change, too; on this machine"
+    )
     parser.add_argument("--out", type=Path, default=Path("runs"), help="folder of the runs (default: %(default)s)")
     parser.add_argument("--results", type=Path, default=Path("results"), help=results)
     parser.add_argument(

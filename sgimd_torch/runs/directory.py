@@ -109,14 +109,14 @@ def with_found_earlier(config: Config) -> Config:
         return config
     with Record(config.directory / RUN_FILE) as record:
         before = record.about.get("settings", {})
-        others = differing(before, config.settings, record.about.get("folder", ""))
+        others = changed_settings(before, config.settings, record.about.get("folder", ""))
     if any(name.startswith("environment") for name in {*others} & config.settings.keys() - names - {*NOT_COMPARED}):
         return config  # it is another robot's run
     earlier = {name: before[name] for name in names & before.keys() if name not in dict(config.parts)}
     return Config.from_settings({**config.settings, **earlier})
 
 
-def differing(before: Mapping[str, Any], now: Mapping[str, Any], folder: str) -> list[str]:
+def changed_settings(before: Mapping[str, Any], now: Mapping[str, Any], folder: str) -> list[str]:
     """Names of the settings that differ; relative paths of the settings ``before`` begin in ``folder``."""
 
     def are_one_path(one: Any, other: Any) -> bool:
@@ -204,7 +204,7 @@ def _refuse_other(record: Record, about: dict[str, Any], dims: Dims) -> set[str]
     if "settings" not in record.about:
         raise RunError(f"{record.path} is a life that save_life wrote, not a run; choose another --out")
     before, now = ({**told["settings"], **told["files"]} for told in (record.about, about))
-    others = differing(before, now, record.about.get("folder", ""))
+    others = changed_settings(before, now, record.about.get("folder", ""))
     if changed := [name for name in others if name not in MAY_CHANGE]:
         raise RunError(
             f"{record.path.parent} belongs to another configuration: "

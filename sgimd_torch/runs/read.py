@@ -22,7 +22,7 @@ from sgimd_torch.learner.events import Kind
 from sgimd_torch.options.config import FILES, OWN, Config
 from sgimd_torch.record import DERIVED, Record, RunError
 from sgimd_torch.record.layout import layout
-from sgimd_torch.runs.directory import NOT_COMPARED, RUN_FILE, code_of, differing, with_found_earlier
+from sgimd_torch.runs.directory import NOT_COMPARED, RUN_FILE, changed_settings, code_of, with_found_earlier
 from sgimd_torch.spaces import Array, Box, Demonstration
 
 Columns = dict[str, np.ndarray]
@@ -281,7 +281,7 @@ def finished(config: Config) -> bool:
     """Whether an undamaged run with these settings is on disk, complete with its last evaluation."""
     try:
         run, wanted = read_run(config.directory), with_found_earlier(config).settings
-        others = {*differing(run.config, wanted, run.folder)} - {*NOT_COMPARED}
+        others = {*changed_settings(run.config, wanted, run.folder)} - {*NOT_COMPARED}
         return bool(run.summary["finished"] and not others) and all(
             config[name] is None
             or (name == "begin_with" and not config[name].exists())  # the record has its content

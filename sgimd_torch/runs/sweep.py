@@ -7,7 +7,7 @@ of a variant with seed 3 goes to OUT/NAME/seed-003. NAME lists the varied values
   sgimd sweep --vary goals=interest-map,uniform --seeds 0-19 --out study   compare two goal models
   sgimd sweep --vary algorithm=sagg-riac,sgim-d --vary budget=5,15 --seeds 0-4 --movements 2000 --out study
   sgimd sweep --vary environment.noise=0,0.03 --seeds 0,3,7-9 --out study --dry-run    list unfinished runs
-  sgimd sweep --vary goals=interest-map,uniform --seeds 0-19 --shard 2/4   the second quarter of the list of runs
+  sgimd sweep --vary goals=interest-map,uniform --seeds 0-19 --on tcp://head:8786    on a Dask cluster
   sgimd table study                                                        show the results
 
 Repeat the command after Ctrl-C or a power cut, or with more seeds: finished runs are kept, unfinished ones continue.
@@ -26,16 +26,15 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Final, NamedTuple, TypeVar
+from typing import Final
 
 from sgimd_torch.files import make_folder
 from sgimd_torch.options.command_line import parse
 from sgimd_torch.options.config import Config, dashed
-from sgimd_torch.runs.parallel import sweep
+from sgimd_torch.runs.parallel import Engine, Machine, sweep
 from sgimd_torch.runs.read import finished, movements_on_disk
 from sgimd_torch.runs.signals import loading, parser_of, say
 
-Item = TypeVar("Item")
 MOST_SEEDS: Final = 100_000
 NOT_VARIED: Final = {
     "seed": "use --seeds, such as 5, 0-19 or 0,3,7-9",
@@ -73,9 +72,8 @@ def run_all(whole: Sequence[Config], options: argparse.Namespace, out: Path) -> 
     Raises:
         ValueError, OSError, ImportError: the request is wrong; nothing was started.
     """
-    configs = options.shard.of(whole)
-    left = [config for config in configs if not finished(config)]
-    say(f"{len(configs)} runs{options.shard.note(whole)}, {len(configs) - len(left)} of them finished: {out}")
+    left = [config for config in whole if not finished(config)]
+    say(f"{len(whole)} runs, {len(whole) - len(left)} of them finished: {out}")
     if options.dry_run:
         for config in left:
             print(f"{config.directory}: {movements_on_disk(config.directory)} of {config.movements} movements")
@@ -85,8 +83,9 @@ def run_all(whole: Sequence[Config], options: argparse.Namespace, out: Path) -> 
         from sgimd_torch.runs.directory import build_again, record_of  # imported here so that --help is fast
     for config in {config.directory.parent: config for config in left}.values():
         build_again(config, record_of(config))  # wrong options raise an error before any run starts
+    engine = engine_of(options)
     make_folder(out)
-    failures = sweep(left, options.processes)
+    failures = sweep(left, engine)
     say(f"{len(left) - len(failures)} runs ended well, {len(failures)} failed: {out}", *failures)
     return 1 if failures else 0
 
@@ -103,7 +102,7 @@ def add_vary(parser: argparse.ArgumentParser) -> None:
 
 
 def add_options(parser: argparse.ArgumentParser, *, seeds: str | None, default: str = "%(default)s") -> None:
-    """Add the options of every command with many runs: --seeds, --shard, --processes and --dry-run.
+    """Add the options of every command with many runs: --seeds, --on, --processes and --dry-run.
 
     Args:
         parser: parser to extend.
@@ -112,35 +111,36 @@ def add_options(parser: argparse.ArgumentParser, *, seeds: str | None, default: 
     """
     parser.add_argument("--seeds", type=_seeds, default=seeds, help=f"seeds: 5, 0-19 or 0,3,7-9 (default: {default})")
     parser.add_argument(
-        "--shard",
-        type=_shard,
-        default="1/1",
-        metavar="K/N",
-        help="part K of N equal parts of the list of runs, for a job array (default: %(default)s)",
+        "--on",
+        metavar="ADDRESS",
+        help="address of a Dask scheduler whose workers make the runs, or its --scheduler-file (default: this machine)",
     )
-    cores = len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
-    parser.add_argument(
-        "--processes", type=_count, default=cores, help="number of runs at a time (default: one for each core)"
-    )
+    parser.add_argument("--processes", type=_count, help="number of runs at a time (default: one for each core)")
     parser.add_argument("--dry-run", action="store_true", help="list unfinished runs without starting them")
 
 
-class Shard(NamedTuple):
-    """Part ``k`` (from 1) of ``n`` parts of a list. Runs of a part follow each other, so it has nearly all variants.
+def engine_of(options: argparse.Namespace) -> Engine:
+    """What carries out the runs, by the options of ``add_options``.
 
-    A part depends on the list alone, not on which runs are finished. The sizes of parts differ by at most 1.
+    Raises:
+        ValueError: no scheduler answers at the address, or --processes is given, too.
+        ImportError: distributed is not installed.
     """
+    if options.on is None:
+        return Machine(options.processes or cores())
+    if options.processes:
+        raise ValueError(
+            "--processes cannot be given with --on: each worker of the cluster has its own number of threads"
+        )
+    with loading():
+        from sgimd_torch.runs.cluster import Cluster  # loaded only on request
 
-    k: int
-    n: int
+    return Cluster(options.on)
 
-    def of(self, whole: Sequence[Item]) -> Sequence[Item]:
-        """This part of the list."""
-        return whole[(self.k - 1) * len(whole) // self.n : self.k * len(whole) // self.n]
 
-    def note(self, whole: Sequence[Item]) -> str:
-        """Text for a message; "" for the whole list."""
-        return f", shard {self.k}/{self.n} of {len(whole)} runs" if self.n > 1 else ""
+def cores() -> int:
+    """Number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
 
 
 def variants_of(varied: Sequence[str], options: Sequence[str]) -> list[Config]:
@@ -198,13 +198,6 @@ def _in_name(option: str, value: str) -> str:
 def is_count(text: str) -> bool:
     """Whether a text is a whole number; Python reads the digits of all scripts."""
     return text.isascii() and text.isdecimal()
-
-
-def _shard(text: str) -> Shard:
-    k, slash, n = text.partition("/")
-    if not (slash and is_count(k) and is_count(n) and 1 <= int(k) <= int(n)):
-        raise argparse.ArgumentTypeError(f"must be like 1/4, the first of four parts, got {text!r}")
-    return Shard(int(k), int(n))
 
 
 def _count(text: str) -> int:

@@ -30,7 +30,7 @@ from sgimd_torch.figures.names import label
 from sgimd_torch.options.catalogue import ROD
 from sgimd_torch.options.command_line import parse
 from sgimd_torch.options.config import Config
-from sgimd_torch.runs.parallel import sweep
+from sgimd_torch.runs.parallel import Machine, sweep
 from sgimd_torch.runs.read import finished, read_run
 from sgimd_torch.runs.signals import Failed, loading, parser_of, say
 from sgimd_torch.runs.sweep import given_in, refuse
@@ -63,7 +63,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     say(f"{len(configs)} learners, {base.movements} movements each, seed {base.seed}, side by side: {base.out}")
     say(*(f"{label(algorithm)} {does}" for algorithm, does in LEARNERS.items()))
     unfinished = [config for config in configs.values() if not finished(config)]
-    if failures := sweep(unfinished, processes=len(configs)):
+    if failures := sweep(unfinished, Machine(len(configs))):
         raise Failed("\n".join(failures))
     variants = [Variant(name, [read_run(config.directory)]) for name, config in configs.items()]
     (figure,) = save_figure(partial(figure_of_curves, variants), base.out / "demo", "png")

@@ -188,10 +188,29 @@ def test_the_readme_and_its_example_are_short_enough_to_read():
 
 
 def test_all_pages_together_can_be_read():
-    pages = [path for path in ROOT.rglob("*.md") if not {".venv", "site", "build"} & set(path.relative_to(ROOT).parts)]
+    pages = [
+        path
+        for path in ROOT.rglob("*.md")
+        if not {".venv", ".pytest_cache", "site", "build"} & set(path.relative_to(ROOT).parts)
+    ]
     assert sum(len(path.read_text(encoding="utf-8").split()) for path in pages) <= 31_000
 
 
 def test_the_version_to_cite_is_that_of_the_package():
     cited = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
     assert f"\nversion: {sgimd_torch.__version__}\n" in cited
+    changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert re.findall(r"^## \[(.*)\]$", changes, re.MULTILINE)[0] == sgimd_torch.__version__
+
+
+def names_of(text):
+    """Names that a program imports from the package, with their modules."""
+    found = re.findall(r"^ *from (sgimd_torch[\w.]*) import (\([^)]*\)|[^\n#]*)", text, re.MULTILINE)
+    return {(module, name) for module, names in found for name in re.findall(r"\w+", names)}
+
+
+def test_pages_use_only_public_names():
+    (public,) = blocks("docs/names.md", "python")
+    public = names_of(public.text) | {("sgimd_torch", name) for name in sgimd_torch.__all__}
+    used = {*()}.union(*(names_of(block.text) for page in PAGES for block in blocks(page, "python")))
+    assert used <= public

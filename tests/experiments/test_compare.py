@@ -17,7 +17,7 @@ from sgimd_torch.options.build import build
 from sgimd_torch.options.command_line import parse
 from sgimd_torch.options.config import Config, words
 from sgimd_torch.record import RunError
-from sgimd_torch.runs.parallel import sweep
+from sgimd_torch.runs.parallel import Machine, sweep
 from sgimd_torch.runs.read import Run, read_run
 from sgimd_torch.runs.signals import command
 from table import CORNER, explored_rows, merge, read_table, result_rows, task_name, tiles_reached
@@ -29,7 +29,7 @@ import sys
 sys.path.insert(0, "EXPERIMENTS")
 import variants
 from pathlib import Path
-from sgimd_torch.runs.parallel import sweep
+from sgimd_torch.runs.parallel import Machine, sweep
 from sgimd_torch.runs.signals import command
 tiny = dict(movements=40, evaluate_at=(20,), repeats=2, benchmark=Path(sys.argv.pop(1)))
 variants.EXPERIMENTS.clear()
@@ -272,7 +272,7 @@ def test_rows_are_drawn_by_lot_and_made_again_in_a_folder_of_their_own(tmp_path,
     monkeypatch.chdir(tmp_path)
     config = Config(algorithm="sgim-d", name="sgim-d.planar-arm-7", movements=20, parts={"environment": "planar-arm-7"})
     again = replace(config, evaluate_at=(20,), floor_at=(), evaluated_by=("own",), out=tmp_path / "first")
-    assert sweep([again], processes=1) == []
+    assert sweep([again], Machine(1)) == []
     made = result_rows(again, read_run(again.directory))
     merge(tmp_path, "results.csv", [made[-1], {**made[-1], "seed": 1, "error": 0.5}])
     words = ["model", "--only", "sgim-d.planar-arm-7", "--seeds", "0-1", "--results", ".", "--processes", "1"]
@@ -282,3 +282,9 @@ def test_rows_are_drawn_by_lot_and_made_again_in_a_folder_of_their_own(tmp_path,
     assert sorted(line.split()[0] for line in said.out.splitlines()) == ["DIFFERS", "equal"]  # the second was made up
     assert "1 equal, 0 equal but for rounding" in said.err
     assert {path.name for path in (tmp_path / "runs").iterdir()} == {"demonstrations", "verify-0"}
+
+
+def test_a_cluster_is_asked_for_as_by_a_sweep(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert command(main, ["paper", "--only", "random", "--seeds", "0", "--results", "mine", "--on", "head"]) == 2
+    assert "error: no Dask scheduler answers at head" in capsys.readouterr().err

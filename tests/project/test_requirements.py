@@ -145,3 +145,16 @@ def test_the_workflow_may_read_only_and_its_actions_have_a_version():
         actions = [step["uses"] for step in job["steps"] if "uses" in step]
         assert actions
         assert all(name.rpartition("@v")[2].isdecimal() for name in actions)
+
+
+def test_only_the_job_that_publishes_can_prove_who_it_is_and_it_publishes_what_was_tried():
+    workflow = yaml.safe_load((ROOT / ".github/workflows/release.yml").read_text(encoding="utf-8"))
+    build, publish = (workflow["jobs"][name] for name in ("build", "publish"))
+    assert workflow["permissions"] == {"contents": "read"}
+    assert "permissions" not in build
+    assert publish["permissions"] == {"id-token": "write"}
+    assert publish["needs"] == "build"
+    assert "scripts/release" in [step.get("run") for step in build["steps"]]
+    assert [step["uses"].partition("@")[0] for step in publish["steps"]] == [
+        *("actions/download-artifact", "pypa/gh-action-pypi-publish")
+    ]

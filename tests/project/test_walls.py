@@ -57,6 +57,7 @@ LIBRARIES = {  # rooms or single files that may import a library, by library
     "jinja2": {"views/report"},
     "docstring_parser": {"options/signature"},
     "tqdm": {"runs/signals", "views"},
+    "distributed": {"runs/cluster"},
     "threadpoolctl": {"inverses/gaussian_process"},
     "cma": {"rivals"},
     "sklearn": {"rivals"},

@@ -1,10 +1,16 @@
-"""The package as users get it: built, installed into an empty environment outside the checkout, and used."""
+"""The package as users get it: built, installed into empty environments outside of the checkout, and used.
+
+``scripts/release`` gives its files by DIST, and has them tried on all supported Pythons that are on PATH.
+"""
 
 import os
+import re
+import shutil
 import subprocess
 import sys
 import tarfile
-import venv
+import zipfile
+from pathlib import Path
 
 import pytest
 
@@ -12,14 +18,13 @@ import sgimd_torch
 from runs import ROOT
 
 pytestmark = pytest.mark.slow
-WITHOUT_CHECKOUT = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-SHORT = [
-    *("--environment", "planar-arm-7", "--algorithm", "sgim-d", "--movements", "3000"),
-    *("--evaluate-at", "1000", "--repeats", "2", "--out", "runs"),
-]
+DIST = os.environ.get("DIST")
+PYTHONS = ["3.11", "3.12", "3.13"] if DIST else [".".join(map(str, sys.version_info[:2]))]
+WITHOUT_CHECKOUT = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "VIRTUAL_ENV")}
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+SHORT = ["--movements", "200", "--evaluate-at", "100", "--repeats", "0"]
 
-
-USER = """
+USER = """# pyright: strict
 import numpy as np
 from numpy.typing import NDArray
 
@@ -41,85 +46,104 @@ print(len(episodes), error < 0.1, theta.shape)
 @pytest.fixture(scope="module")
 def built(tmp_path_factory):
     """The folder with the source distribution, and with the wheel built from the source distribution."""
+    if DIST:
+        return Path(DIST)
     place = tmp_path_factory.mktemp("dist")
     words = [sys.executable, "-m", "build", "--outdir", str(place), str(ROOT)]
     subprocess.run(words, check=True, capture_output=True, env=WITHOUT_CHECKOUT)
     return place
 
 
-@pytest.fixture(scope="module")
-def installed(built, tmp_path_factory):
-    """The folder of commands of an environment with the wheel, the extra ``report``, and mypy."""
-    place = tmp_path_factory.mktemp("wheel")
-    (wheel,) = built.glob("sgimd_torch-*.whl")
-    venv.create(place / "env", with_pip=True)
-    commands = place / "env" / "bin"
-    pip = [str(commands / "python"), "-m", "pip", "--disable-pip-version-check", "-q", "install"]
-    wanted = [f"{wheel}[report]", "mypy", "-c", str(ROOT / "constraints.txt")]
-    subprocess.run([*pip, *wanted], check=True, env=WITHOUT_CHECKOUT)
-    return commands
+class Installed:
+    """An environment with the wheel in a folder of its own; ``go`` runs a program of it there."""
+
+    def __init__(self, built, version, folder, extras, *more):
+        program = shutil.which(f"python{version}")
+        if program is None or subprocess.run([program, "--version"], capture_output=True).returncode:
+            pytest.skip(f"python{version} is not on PATH")
+        self.folder = folder
+        subprocess.run([program, "-m", "venv", folder / "env"], check=True, env=WITHOUT_CHECKOUT)
+        (wheel,) = built.glob("*.whl")
+        self.ok("pip", "install", "-q", f"{wheel}{extras}", *more)
+        self.ok("pip", "check")
+
+    def go(self, program, *words):
+        command = [self.folder / "env/bin" / program, *map(str, words)]
+        return subprocess.run(command, capture_output=True, text=True, cwd=self.folder, env=WITHOUT_CHECKOUT)
+
+    def ok(self, program, *words):
+        done = self.go(program, *words)
+        assert done.returncode == 0, done.stdout + done.stderr
+        return done.stdout
 
 
-@pytest.fixture(scope="module")
-def sgimd(installed, tmp_path_factory):
-    """A function that runs the installed command in a new folder, and returns exit code, stdout and stderr."""
-    away = tmp_path_factory.mktemp("away")
-
-    def sgimd(*words):
-        command = [str(installed / "sgimd"), *map(str, words)]
-        done = subprocess.run(command, capture_output=True, text=True, cwd=away, env=WITHOUT_CHECKOUT)
-        return done.returncode, done.stdout, done.stderr
-
-    sgimd.away = away
-    return sgimd
+@pytest.fixture(scope="module", params=PYTHONS)
+def smallest(request, built, tmp_path_factory):
+    return Installed(built, request.param, tmp_path_factory.mktemp("smallest"), "")
 
 
-def test_it_runs_resumes_and_is_looked_at_without_a_checkout(sgimd):
-    for words, printed in (
-        (["run", *SHORT, "--movements", "300"], "300 movements, mean error"),
-        (["run", *SHORT, "--resume"], "3000 movements, mean error"),
-        (["table", "runs"], "sgim-d"),
-        (["report", "runs"], ""),
-    ):
-        code, output, errors = sgimd(*words)
-        assert code == 0, errors
-        assert printed in output
-    assert (sgimd.away / "runs/report.html").read_text().startswith("<!DOCTYPE html>")
+@pytest.fixture(scope="module", params=PYTHONS)
+def complete(request, built, tmp_path_factory):
+    checkers = ("mypy", "pyright[nodejs]", "-c", ROOT / "constraints.txt")
+    return Installed(built, request.param, tmp_path_factory.mktemp("complete"), "[all]", *checkers)
 
 
-@pytest.mark.parametrize(
-    ("words", "extra"),
-    [
-        (["run", *SHORT, "--name", "watched", "--board", "true"], "board"),
+def test_the_programs_of_the_readme_need_the_smallest_installation(smallest):
+    first, *others = re.findall(r"^```python\n(.*?)^```$", README, re.DOTALL | re.MULTILINE)
+    assert re.fullmatch(r"error 0\.1\d m\n", smallest.ok("python", "-c", first))
+    for program in others:
+        smallest.ok("python", "-c", program)
+    assert smallest.ok("sgimd", "--version") == f"sgimd_torch {sgimd_torch.__version__}\n"
+
+
+def test_what_is_not_installed_is_named_with_the_pip_command_that_brings_it(smallest):
+    arm = ["--environment", "planar-arm-7", "--algorithm", "sgim-d", *SHORT]
+    smallest.ok("sgimd", "run", *arm)
+    for words, extra in (
+        (["run", *arm, "--name", "watched", "--board", "true"], "board"),
+        (["run", *arm, "--name", "modelled", "--inverse", "model"], "forward"),
+        (["run", *arm, "--name", "rival", "--goals", "alp-gmm"], "rivals"),
         (["film", "runs/sgim-d/seed-000"], "film"),
-        (["run", *SHORT, "--name", "modelled", "--inverse", "model"], "forward"),
-        (["run", *SHORT, "--name", "rival", "--goals", "alp-gmm"], "rivals"),
-    ],
-)
-def test_what_is_not_installed_is_named_with_the_pip_command_that_brings_it(sgimd, words, extra):
-    code, _, errors = sgimd(*words)
-    assert code == 2
-    assert f"pip install 'sgimd-torch[{extra}]'" in errors
-    assert "Traceback" not in errors
+        (["report", "runs"], "report"),
+        (["sweep", *arm, "--out", "swept", "--on", "head:8786"], "cluster"),
+    ):
+        done = smallest.go("sgimd", *words)
+        assert done.returncode == 2
+        assert f"pip install 'sgimd-torch[{extra}]'" in done.stderr
+        assert "Traceback" not in done.stderr
 
 
-def test_a_strict_program_of_a_user_runs_and_its_types_are_checked_against_ours(installed, tmp_path):
-    (tmp_path / "user.py").write_text(USER)
-    (tmp_path / "wrong.py").write_text(USER.replace("arm, 0, movements=200))", "arm, 0, movements='many'))"))
+def test_the_commands_of_the_readme_run_and_resume_with_all_extras(complete):
+    runs = [line.partition("#")[0].split() for line in re.findall(r"^sgimd (run .*--board.*)$", README, re.MULTILINE)]
+    assert len(runs) == 3
+    for run in runs:
+        complete.ok("sgimd", *run, *SHORT)
+    complete.ok("sgimd", *runs[0], *SHORT, "--movements", 300, "--resume")
+    assert "300" in complete.ok("sgimd", "table", "runs/sgim-d")
+    complete.ok("sgimd", "report", "runs/sgim-d")
+    assert (complete.folder / "runs/sgim-d/report.html").read_text().startswith("<!DOCTYPE html>")
 
-    def checked(*words):
-        words = [str(installed / "python"), *words]
-        return subprocess.run(words, capture_output=True, text=True, cwd=tmp_path, env=WITHOUT_CHECKOUT)
 
-    assert checked("user.py").stdout == f"{sgimd_torch.__version__} 127\n200 True (7,)\n"
-    done = checked("-m", "mypy", "--strict", "user.py")
-    assert done.returncode == 0, done.stdout
-    done = checked("-m", "mypy", "--strict", "wrong.py")
-    assert 'incompatible type "str"; expected "int"' in done.stdout  # mypy has read our types
+def test_a_strict_program_of_a_user_runs_and_its_types_are_checked_against_ours(complete):
+    (complete.folder / "user.py").write_text(USER)
+    (complete.folder / "wrong.py").write_text(USER.replace("arm, 0, movements=200))", "arm, 0, movements='many'))"))
+    assert complete.ok("python", "user.py") == f"{sgimd_torch.__version__} 127\n200 True (7,)\n"
+    complete.ok("mypy", "--strict", "user.py")
+    complete.ok("pyright", "--pythonpath", complete.folder / "env/bin/python", "user.py")
+    assert 'incompatible type "str"; expected "int"' in complete.go("mypy", "--strict", "wrong.py").stdout
+    assert '"int"' in complete.go("pyright", "--pythonpath", complete.folder / "env/bin/python", "wrong.py").stdout
+
+
+def test_the_wheel_has_the_package_and_nothing_else(built):
+    (path,) = built.glob("*.whl")
+    names = {name for name in zipfile.ZipFile(path).namelist() if ".dist-info/" not in name}
+    ours = {path.relative_to(ROOT).as_posix() for path in (ROOT / "sgimd_torch").rglob("*") if path.is_file()}
+    assert names == {name for name in ours if "__pycache__" not in name}
+    assert path.stat().st_size < 3e6
 
 
 def test_the_source_distribution_has_what_builds_tests_and_explains_and_no_more(built):
-    (path,) = built.glob("sgimd_torch-*.tar.gz")
+    (path,) = built.glob("*.tar.gz")
     with tarfile.open(path) as archive:
         names = {name.partition("/")[2] for name in archive.getnames()}
     top = ["LICENSE", "README.md", "CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "constraints.txt"]

@@ -7,7 +7,6 @@ import os
 import re
 import shutil
 import signal
-from pathlib import Path
 
 import pytest
 
@@ -76,18 +75,6 @@ def test_seeds_are_one_or_a_range_or_a_list(tmp_path, monkeypatch, capsys):
     assert not list(tmp_path.iterdir())
 
 
-def test_shards_are_consecutive_parts_of_the_list_and_together_the_whole(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    options = ["--vary", "goals=interest-map,uniform", "--seeds", "0-4"]
-    whole, _ = listed(capsys, *options)
-    for n in (1, 3, 4, 10, 12):
-        parts = [listed(capsys, *options, "--shard", f"{k}/{n}")[0] for k in range(1, n + 1)]
-        assert [run for part in parts for run in part] == whole
-        assert {len(part) for part in parts} <= {10 // n, -(-10 // n)}
-    _, said = listed(capsys, *options, "--shard", "3/4")
-    assert "2 runs, shard 3/4 of 10 runs, 0 of them finished: runs" in said
-
-
 def test_every_run_is_what_it_would_be_alone_and_a_second_start_does_nothing(tmp_path, capsys):
     options = [*ALONE, "--vary", "algorithm=random,sagg-riac", "--processes", 2, "--out", tmp_path / "study"]
     assert swept(*options) == 0
@@ -104,9 +91,6 @@ def test_every_run_is_what_it_would_be_alone_and_a_second_start_does_nothing(tmp
     assert swept(*options) == 0
     assert "2 of them finished" in capsys.readouterr().err
     assert {path: path.stat().st_mtime_ns for path in (tmp_path / "study").rglob("*")} == before
-    for shard, left in (("1/1", 2), ("1/2", 0), ("2/2", 2)):  # what is finished does not shift the others
-        lines, _ = listed(capsys, *options, "--seeds", "0-1", "--shard", shard)
-        assert [Path(line.partition(":")[0]).name for line in lines] == ["seed-001"] * left
 
 
 def test_a_file_of_goals_that_has_changed_makes_a_run_unfinished(benchmark, tmp_path, go):
@@ -131,7 +115,7 @@ def test_failures_are_named_in_the_order_of_the_list_and_the_others_go_on(tmp_pa
         if config.seed == 2:
             raise ValueError("its rows are damaged")
 
-    failures = parallel.sweep(configs, processes=2, on_end=on_end)
+    failures = parallel.sweep(configs, parallel.Machine(2), on_end=on_end)
     assert failures[1] == "random seed 2 failed: its rows are damaged"
     for failure, seed in zip(failures[::2], (1, 3), strict=True):
         assert re.match(f"random seed {seed} failed: .*seed-00{seed} cannot be made", failure)
@@ -140,7 +124,7 @@ def test_failures_are_named_in_the_order_of_the_list_and_the_others_go_on(tmp_pa
 
 def test_two_runs_with_one_directory_are_refused(tmp_path):
     with pytest.raises(ValueError, match=r"two runs would be written to .*seed-000"):
-        parallel.sweep([short(tmp_path), short(tmp_path, inverse="nearest")], processes=1)
+        parallel.sweep([short(tmp_path), short(tmp_path, inverse="nearest")], parallel.Machine(1))
     assert not list(tmp_path.iterdir())
 
 
@@ -214,7 +198,7 @@ def test_stopped_it_stops_its_runs_and_goes_on_as_if_nothing_had_happened(
 def test_no_library_for_figures_or_learning_is_loaded_to_watch_processes(tmp_path):
     program = (
         "import sys, sgimd_torch.runs.sweep as sweep; sweep.main(sys.argv[1:]);"
-        "print(sorted({'matplotlib', 'mujoco', 'torch', 'tensorboard'} & {*sys.modules}))"
+        "print(sorted({'distributed', 'matplotlib', 'mujoco', 'torch', 'tensorboard'} & {*sys.modules}))"
     )
     code = start(program, "--dry-run", "--out", tmp_path)
     assert code.communicate()[0].splitlines()[-1] == "[]"

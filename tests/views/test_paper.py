@@ -80,8 +80,6 @@ def test_the_page_waits_for_the_last_run(tiny, capsys):
     said = capsys.readouterr()
     assert len(said.out.splitlines()) == 13
     assert "13 of 26 are left" in said.err
-    assert command(paper.main, [*options, "--seeds", "0-1", "--shard", "1/2"]) == 0  # finished before
-    assert capsys.readouterr().out == ""
 
 
 def test_every_figure_is_on_the_page_beside_its_statement_and_nothing_is_fetched(page):

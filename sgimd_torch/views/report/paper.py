@@ -10,7 +10,7 @@ With --algorithm ours they have our inverse model and exploration; choose anothe
   sgimd paper figures                     1000 movements, 5 seeds: about ten minutes on two cores
   sgimd paper figures --full              the paper's 5000 movements, evaluated every 1000, 10 seeds: an hour or two
   sgimd paper ours --algorithm ours       with our inverse model and exploration
-  sgimd paper figures --shard 2/4         the second quarter of the runs; the page is written when all are finished
+  sgimd paper figures --on HOST:PORT      on a Dask cluster
 
 Other options of sgimd run, such as --movements, apply to all runs.
 
