@@ -38,6 +38,7 @@ MOVED: Final = 0.02  # rad, least way of a joint that moves
 STILL: Final = 1.0  # s after which an arm that was led and does not move has been led to the end
 GENTLY: Final = 0.5  # share of ``speed`` on the way back to rest
 KEPT: Final = 0.9  # least share of the commands of ``rate`` that are sent without a warning
+UNITS: Final = {"degrees": "deg", "range_0_100": "0:100", "range_m100_100": "-100:100"}  # by LeRobot's MotorNormMode
 OF_MODEL: Final = ("joints", "low", "high", "rest", "durations", "n_knots", "servos", "keyframe", "posture")
 
 
@@ -125,6 +126,10 @@ class LeRobotArm:
             raise ValueError(f"motors must name one for each of {', '.join(self.joints)}, got {', '.join(motors)}")
         if lacking := [joint for joint in self.joints if joint not in unit_of]:
             raise ValueError(f"units has none for {', '.join(lacking)}; deg,gripper=0:100 is deg for all but gripper")
+        for joint, motor in zip(self.joints, self._motors, strict=True):
+            reads = _reads(self._buses, motor.removesuffix(".pos"))
+            if unit_of[joint] in ("deg", "rad") and reads not in ("", unit_of[joint]):
+                raise ValueError(f"{motor} reads {reads}, not {unit_of[joint]}: units {joint}={reads}")
         sides = zip(self.joints, ranges.low.tolist(), ranges.high.tolist(), strict=True)
         self._scales, self._shifts = np.array([in_rad(name, unit_of[name], (low, high)) for name, low, high in sides]).T
         self.settle, self.rate, self.speed, self.step, self.heat = settle, rate, speed, step, heat
@@ -305,12 +310,20 @@ class LeRobotArm:
         return call()
 
 
+def _reads(buses: list[Any], motor: str) -> str:
+    """The unit that this motor of a bus of LeRobot reads, "" if it is unknown."""
+    tables = [bus.motors for bus in buses if isinstance(getattr(bus, "motors", None), Mapping)]
+    modes = [table[motor].norm_mode for table in tables if hasattr(table.get(motor), "norm_mode")]
+    return UNITS.get(modes[0].value, "") if modes else ""
+
+
 def _of_lerobot(name: str, port: str, robot_id: str) -> Any:
     """The robot of LeRobot with this name."""
     try:
         from lerobot import robots  # an optional dependency
     except ImportError as error:
-        raise ImportError(f"{name} is a robot of LeRobot: pip install 'sgimd-torch[arm]' ({error})") from error
+        wanted = "pip install 'sgimd-torch[arm]', in Python 3.12 or later"
+        raise ImportError(f"{name} is a robot of LeRobot: {wanted} ({error})") from error
     for module in pkgutil.iter_modules(robots.__path__):  # each registers its robots; some need drivers of their own
         with suppress(ImportError):
             import_module(f"{robots.__name__}.{module.name}")

@@ -78,6 +78,7 @@ class RunLoop:
     Attributes:
         record: record of the run; new movements are written to it after the replay.
         movements, recorded, failed: number of movements so far, number recorded earlier, and number that failed.
+        told: number of failures since this process began.
 
     Raises:
         RunError, OSError: see ``open_run``.
@@ -87,7 +88,7 @@ class RunLoop:
         self.parts = parts
         self.record, notes = open_run(parts, resume=resume)
         say(*parts.notes, *notes)
-        self.movements, self.recorded, self.failed = 0, self.record.movements, 0
+        self.movements, self.recorded, self.failed, self.told = 0, self.record.movements, 0, 0
         self.seconds = Seconds(self.record.about.get("seconds", {}))
         self.evaluations = Evaluations(parts, self.record)
         parts.learner.listeners.append(self._hear)
@@ -228,8 +229,9 @@ class RunLoop:
         self.movements = episode.index + 1
         if episode.failed:
             self.failed += 1
-            if not replayed and self.failed <= N_TOLD:
-                more = "; further failures are only counted" if self.failed == N_TOLD else ""
+            self.told += not replayed
+            if not replayed and self.told <= N_TOLD:
+                more = "; further failures are only counted" if self.told == N_TOLD else ""
                 say(f"movement {episode.index} failed: {episode.failed}{more}")
         for listener in self.listeners:
             listener.episode(episode, replayed)

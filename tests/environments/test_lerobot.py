@@ -3,6 +3,7 @@
 import io
 import re
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -147,6 +148,7 @@ REFUSED = {
     "so101 is a robot of LeRobot: pip install": {"robot": "so101"},
     "units is missing": {"units": ""},
     "units has none for joint0, joint2": {"units": "joint1=deg"},
+    "joint2.pos reads 0:100, not rad: units joint2=0:100": {"units": "deg,joint2=rad"},
     "no joint is named gripper": {"units": "deg,gripper=0:100"},
     "unknown motor 'turn'; known are joint0.pos": {"motors": ("joint0", "joint1", "turn")},
     "motors must name one for each of joint0, joint1, joint2": {"motors": ("joint0", "joint1")},
@@ -163,9 +165,10 @@ def test_code_that_drives_or_sees_the_arm_is_executed_only_if_it_is_trusted():
 @pytest.mark.parametrize("message", REFUSED)
 def test_what_cannot_work_is_refused_before_anything_moves(model, message):
     _, on = on_table(model)
+    on.motors = {"joint2": SimpleNamespace(norm_mode=SimpleNamespace(value="range_0_100"))}  # as of LeRobot's buses
     given = {
         "robot": "arms:make",
-        "units": "deg",
+        "units": "deg,joint2=0:100",
         "outcome": "site:tip:x",
         "low": (-1.0,),
         "high": (1.0,),

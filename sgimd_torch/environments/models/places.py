@@ -291,7 +291,7 @@ def find(model: mujoco.MjModel, what: str, kind: str, name: str) -> Place:
     names = _names(model, kind)
     if name not in names:
         others = [f"; write {other}:{name}" for other in _COUNTS if name in _names(model, other)]
-        near = did_you_mean(name, names, 3) or f"; {kind}s with a name: {', '.join(names[:20]) or 'none'}"
+        near = did_you_mean(name, names, 3) or f"; each {kind} with a name: {', '.join(names[:20]) or 'none'}"
         raise ValueError(f"{what}: the model has no {kind} {name!r}{others[0] if others else near}")
     number = int(getattr(model, kind)(name).id)
     if kind != "joint":
