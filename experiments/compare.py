@@ -81,6 +81,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         say(f"{len(left) - len(failures)} runs ended well, {len(failures)} failed: {where}", *failures)
     if options.all:
         random_robots.make(options.results, options.processes or cores())
+        random_robots.make_repeated(options.results, options.processes or cores())
         changing.make(options.results, options.processes or cores())
     return 1 if failures else 0
 

@@ -46,6 +46,7 @@ class Evidence:
         rows: results.csv with the index answer, variant, movements and seed.
         explored, asked: tables explored.csv and asked.csv, with the index variant and seed.
         random: table random.csv.
+        repeated: table repeated.csv.
         changes: table changes.csv with the index robot, change, learner, movements and seed.
         models: table model_files.csv.
     """
@@ -54,6 +55,7 @@ class Evidence:
     explored: pd.DataFrame
     asked: pd.DataFrame
     random: pd.DataFrame
+    repeated: pd.DataFrame
     changes: pd.DataFrame
     models: pd.DataFrame
 
@@ -69,8 +71,8 @@ class Evidence:
         explored, asked = (read_table(folder, name).set_index("variant") for name in ("explored.csv", "asked.csv"))
         after = ["robot", "change", "learner", "movements", "seed"]
         changes = read_table(folder, "changes.csv").set_index(after).sort_index()
-        random, models = (read_table(folder, name) for name in ("random.csv", "model_files.csv"))
-        return cls(rows, explored, asked, random, changes, models)
+        random, repeated, models = (read_table(folder, f"{name}.csv") for name in ("random", "repeated", "model_files"))
+        return cls(rows, explored, asked, random, repeated, changes, models)
 
     def at(self, name: str, movements: int = LAST, column: str = "error") -> pd.Series:
         """Errors (m) by seed after a number of movements; noise floors (m) if the column is "floor"."""

@@ -27,7 +27,7 @@ from sgimd_torch.environments.protocol import FromFiles
 from sgimd_torch.files import make_folder
 from sgimd_torch.options.build import task_of
 from sgimd_torch.options.config import Config
-from sgimd_torch.runs.parallel import sweep
+from sgimd_torch.runs.parallel import Machine, sweep
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.signals import command, say
 from sgimd_torch.views.statistics import LEVEL
@@ -218,7 +218,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         say(f"{n} of {len(FILES)}: {file.path} {file.outcome} {row['told']} {row['words']}")
         if row["told"] == RIGHT:
             configs = lives(file, path, chosen.out)
-            if failed := sweep(configs, chosen.processes):
+            if failed := sweep(configs, Machine(chosen.processes)):
                 failures += failed
             else:
                 merge(chosen.results, TABLE, [row | errors(configs)])

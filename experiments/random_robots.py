@@ -2,6 +2,7 @@
 
     experiments/random_robots.py                                        the lives of the page ANY_ROBOT
     experiments/random_robots.py --robots 0 36 --results development    others, in a table of your own
+    experiments/random_robots.py --repeated                             five lives on each robot: a fair measure of harm
 
 Nine families: planar and spatial chains, poses (which fill a thin part of their box), smooth and rugged maps, throws,
 maps that do nothing in half of Pi, contexts, periodic parameters. Units go from mm to km. Noise is absent, even,
@@ -16,8 +17,9 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Final
 
@@ -44,6 +46,9 @@ NOISES: Final = ("none", "even", "speed", "gross")
 COUNTS: Final = (50, 100, 250, 500, 1000)  # movements at which a learner is evaluated
 UNSEEN: Final = range(320, 380)  # robots of the page ANY_ROBOT, named before the first of them was run
 TABLE: Final = "random.csv"
+REPEATED: Final = range(460, 490)  # robots that are learnt once by each of the `SEEDS`, named before the first was run
+SEEDS: Final = range(265, 270)
+REPEATED_TABLE: Final = "repeated.csv"
 RANDOM: Final = "random"  # reference: random movements
 BASELINE: Final = "uniform-nearest"  # reference: the standard baseline
 LEARNERS: Final[Mapping[str, Callable[[RandomRobot, int], Learner]]] = {
@@ -157,13 +162,24 @@ def life(number: int, name: str) -> dict[int, tuple[float, int]]:
     """Errors of the learner with this ``name`` on the robot with this ``number``, and the changes that it noticed."""
     robot = RandomRobot(number)
     learner = LEARNERS[name](robot, number)
-    references = [LocalProcess(learner.problem), NearestNeighbour(learner.problem)]
-    errors = {}
-    for episode in run(learner, robot, number, movements=COUNTS[-1]):
+    references: list[Inverse] = [LocalProcess(learner.problem), NearestNeighbour(learner.problem)]
+    answers = references if name in (RANDOM, BASELINE) else [learner.inverse]
+    return {at: (error, len(learner.changes)) for at, error in errors(robot, learner, number, answers)}
+
+
+def repeated_life(number: int, name: str, seed: int) -> dict[int, tuple[float]]:
+    """Errors of a life with this ``seed``, answered by `process`."""
+    robot = RandomRobot(number)
+    learner = LEARNERS[name](robot, seed)
+    answer = LocalProcess(learner.problem) if name == RANDOM else learner.inverse
+    return {at: (error,) for at, error in errors(robot, learner, seed, [answer])}
+
+
+def errors(robot: RandomRobot, learner: Learner, seed: int, answers: Sequence[Inverse]) -> Iterator[tuple[int, float]]:
+    """The numbers of movements at which a learner is evaluated, and the least error of the ``answers``."""
+    for episode in run(learner, robot, seed, movements=COUNTS[-1]):
         if (movements := episode.index + 1) in COUNTS:
-            answers: list[Inverse] = references if name in (RANDOM, BASELINE) else [learner.inverse]
-            errors[movements] = min(map(robot.error, answers)), len(learner.changes)
-    return errors
+            yield movements, min(map(robot.error, answers))
 
 
 def make(
@@ -174,12 +190,22 @@ def make(
     make_lives(results, TABLE, life, lives, processes)
 
 
+def make_repeated(results: Path, processes: int) -> None:
+    """Make the lives of each of the `SEEDS` that the table in ``results`` lacks."""
+    lives = dict.fromkeys(product(REPEATED, ("practice", RANDOM), SEEDS), COUNTS[-1])
+    make_lives(results, REPEATED_TABLE, repeated_life, lives, processes)
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     options = parser(__doc__)
     numbers = "first number of a robot, and the number after the last (default: those of the page)"
     options.add_argument("--robots", nargs=2, type=int, default=[UNSEEN.start, UNSEEN.stop], help=numbers)
     options.add_argument("--learners", nargs="+", default=[*LEARNERS], choices=LEARNERS, help="learners (default: all)")
+    options.add_argument("--repeated", action="store_true", help="practice and random movements, five lives a robot")
     chosen = options.parse_args(argv)
+    if chosen.repeated:
+        make_repeated(chosen.results, chosen.processes)
+        return 0
     make(chosen.results, chosen.processes, range(*chosen.robots), chosen.learners)
     return 0
 

@@ -103,6 +103,69 @@ def table(page: Page) -> str:
     return markdown(("mean, worst", *map(str, COUNTS)), rows)
 
 
+def repeated(evidence: Evidence, at: int) -> pd.DataFrame:
+    """`practice` and random movements, compared by robot over its seeds.
+
+    Columns: ``ratio``, of their errors (geometric mean); ``harmed``, whether `practice` clearly errs more than
+    ``HARMFUL`` times as much, by Welch's one-sided test of log errors (p < .05); ``lives``, the share of seeds on which
+    it does; ``equal``, this share for two lives of random movements.
+
+    Raises:
+        NotRun: there is no robot with two seeds.
+    """
+    rows = evidence.repeated[evidence.repeated["movements"] == at]
+    table = np.log(rows.pivot(index=["number", "seed"], columns="learner", values="error").dropna())
+    robots = {}
+    for number, by_seed in table.groupby("number"):
+        ours, theirs, harm = by_seed["practice"].to_numpy(), by_seed[RANDOM].to_numpy(), np.log(HARMFUL)
+        if (n := len(ours)) > 1:
+            welch = stats.ttest_ind(ours, theirs + harm, equal_var=False, alternative="greater")
+            equal = (theirs[:, None] - theirs > harm).sum() / (n * (n - 1))
+            lives = (ours - theirs > harm).mean()
+            robots[number] = np.exp(ours.mean() - theirs.mean()), welch.pvalue < 0.05, lives, equal
+    if not robots:
+        raise NotRun(f"repeated lives on random robots at {at}")
+    return pd.DataFrame.from_dict(robots, orient="index", columns=["ratio", "harmed", "lives", "equal"])
+
+
+def times_random(evidence: Evidence, at: int, *, level: Level = LEVEL) -> Interval:
+    """The geometric mean over robots of the error of `practice` divided by that of random movements."""
+    ratios = np.log(repeated(evidence, at)["ratio"].to_numpy())
+    if level is None:
+        return Interval(float(np.exp(ratios.mean())))
+    return interval(lambda drawn: np.exp(drawn.mean(axis=-1)), ratios, rng=bootstrap_rng(), level=level)
+
+
+def clearly_harmed(evidence: Evidence, at: int, *, level: Level = LEVEL) -> Interval:
+    """The share of robots on which `practice` clearly errs more than random movements."""
+    return share(repeated(evidence, at)["harmed"], level=level)
+
+
+def fair(page: Page) -> str:
+    """`practice` over random movements, both answered by `process`, five lives a robot."""
+    try:
+        tables = [repeated(page.evidence, at) for at in COUNTS]
+    except NotRun as missing:
+        page.missing.append(str(missing))
+        return "Not run."
+    rows = [
+        [
+            "geometric mean [95 %]",
+            *(page.cell(times_random, page.evidence, at, form=".2f", between=True) for at in COUNTS),
+        ],
+        ["worst robot", *(f"{table['ratio'].max():.2f}" for table in tables)],
+        *(
+            [head, *(f"{table[column].mean():.0%}" for table in tables)]
+            for head, column in (
+                ("**clearly harmed robots**", "harmed"),
+                ("lives with a larger error", "lives"),
+                ("... of two equal learners", "equal"),
+            )
+        ),
+    ]
+    return markdown(("over random movements", *map(str, COUNTS)), rows)
+
+
 def alarms(page: Page) -> str:
     """How many lives on random robots, which do not change, noticed a change: ``2 of 240``."""
     rows = page.evidence.random

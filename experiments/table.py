@@ -36,6 +36,7 @@ TABLES: Final[dict[str, tuple[int, tuple[str, ...]]]] = {
     "explored.csv": (2, ("variant", "seed", "tiles", "goals", "near")),
     "asked.csv": (3, ("variant", "seed", "teacher", *_ASKED)),
     "rivals.csv": (4, ("rival", "setting", "seed", "movements", "linear", "process")),
+    "repeated.csv": (4, ("number", "learner", "seed", "movements", "error")),
     "random.csv": (3, ("number", "learner", "movements", "error", "noticed")),
     "model_files.csv": (3, ("file", "outcome", "options", "version", "told", "words", "practice", "random", *_RATIO)),
     "refinement.csv": (

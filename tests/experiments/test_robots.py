@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import robots
@@ -89,6 +90,26 @@ def test_only_robots_that_every_learner_has_learnt_count(tmp_path):
     found = replace(found, random=found.random.query("number != 3 or learner != 'random'"))
     assert [*robots.errors(found, 50).index] == [0, 1, 2, 4]
     assert {*robots.errors(found, 50).columns} == {*LEARNERS}
+
+
+def test_harm_is_judged_over_the_lives_of_a_robot(tmp_path):
+    """A robot on which practice errs twice as much in each life is harmed; one with the same errors in another order is
+    not, though it errs more in half of its lives."""
+    random = [1.0, 1.1, 1.2, 1.3, 1.4]
+    practice = {460: [2 * error for error in random], 461: random[::-1]}
+    lives = [(n, name, seed, errors[seed]) for n, ours in practice.items() for seed in range(5)
+             for name, errors in (("practice", ours), ("random", random))]  # fmt: skip
+    rows = [(n, name, seed, 50, error) for n, name, seed, error in lives]
+    columns = ["number", "learner", "seed", "movements", "error"]
+    found = replace(found_in(tmp_path), repeated=pd.DataFrame(rows, columns=columns))
+    table = robots.repeated(found, 50)
+    assert table.ratio.tolist() == pytest.approx([2, 1])
+    assert table.harmed.tolist() == [True, False]
+    assert table.lives.tolist() == [1, 0.4]
+    assert table["equal"].tolist() == [0.5, 0.5]
+    assert robots.clearly_harmed(found, 50, level=None).value == 0.5
+    with pytest.raises(NotRun, match="at 100"):
+        robots.repeated(found, 100)
 
 
 def test_the_learner_of_before_is_compared_with_the_one_that_starts_anew(tmp_path):
