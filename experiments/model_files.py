@@ -1,7 +1,7 @@
 """Model files that nobody made for this library: what is told before the first movement, and what is learnt.
 
     pip install --target robots --no-deps dm_control robosuite pybullet gymnasium gymnasium-robotics metaworld
-    experiments/model_files.py robots                   the rows that the page MODEL_FILES lacks
+    experiments/model_files.py robots                   the rows that the page ANY_ROBOT lacks
     experiments/model_files.py wheels/* --results mine  packages in folders of their own, rows in mine/
 
 Nothing is downloaded, and no file is changed: one command for each, with the options in ``FILES``. A file is "refused"

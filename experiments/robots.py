@@ -64,10 +64,15 @@ def best(evidence: Evidence, name: str, at: int, *, level: Level = LEVEL) -> Int
 def over(evidence: Evidence, ours: str, theirs: str, at: int, *, level: Level = LEVEL) -> Interval:
     """The geometric mean over robots of our error divided by theirs."""
     table = errors(evidence, at)
-    ratios = np.log(table[ours] / table[theirs]).to_numpy()
+    return geometric_mean(table[ours] / table[theirs], level=level)
+
+
+def geometric_mean(ratios: pd.Series, *, level: Level = LEVEL) -> Interval:
+    """The geometric mean over robots, with its interval."""
+    logs = np.log(ratios.to_numpy())
     if level is None:
-        return Interval(float(np.exp(ratios.mean())))
-    return interval(lambda drawn: np.exp(drawn.mean(axis=-1)), ratios, rng=bootstrap_rng(), level=level)
+        return Interval(float(np.exp(logs.mean())))
+    return interval(lambda drawn: np.exp(drawn.mean(axis=-1)), logs, rng=bootstrap_rng(), level=level)
 
 
 def any_robot(evidence: Evidence) -> list[Claim]:
@@ -130,10 +135,7 @@ def repeated(evidence: Evidence, at: int) -> pd.DataFrame:
 
 def times_random(evidence: Evidence, at: int, *, level: Level = LEVEL) -> Interval:
     """The geometric mean over robots of the error of `practice` divided by that of random movements."""
-    ratios = np.log(repeated(evidence, at)["ratio"].to_numpy())
-    if level is None:
-        return Interval(float(np.exp(ratios.mean())))
-    return interval(lambda drawn: np.exp(drawn.mean(axis=-1)), ratios, rng=bootstrap_rng(), level=level)
+    return geometric_mean(repeated(evidence, at)["ratio"], level=level)
 
 
 def clearly_harmed(evidence: Evidence, at: int, *, level: Level = LEVEL) -> Interval:
