@@ -52,8 +52,7 @@ MANY: Final = Path("many.npz")  # file of the first demonstrations
 MADE: Final = (CORNER, MANY)  # files that ``make_subsets`` writes
 ONCE: Final[Variant] = {"teacher": "initial", "teacher.every": 1}  # at the start, one demonstration a movement
 PRACTICE: Final[Variant] = {"algorithm": "practice"}
-WIDE: Final[Variant] = {**PRACTICE, "explore.uniform": 1.0}  # global movements are uniform
-NARROW: Final[Variant] = {**PRACTICE, "explore.uniform": 0.0}  # global movements spread from the middle of Pi
+WIDE: Final[Variant] = {**PRACTICE, "explore.uniform": 1.0}  # the first movements are uniform, too
 TAUGHT: Final[Variant] = {"algorithm": "practice-taught", **ONCE}
 UNTAUGHT: Final[dict[str, Variant]] = {
     "random": {"algorithm": "random"},
@@ -62,7 +61,7 @@ UNTAUGHT: Final[dict[str, Variant]] = {
     "cma-mae": {"algorithm": "cma-mae"},
 }
 # Steps from the standard baseline to `practice`.
-MIDDLE: Final[Variant] = {**REFERENCES[UNIFORM], "explore": "returning", "global_range": (0.05, 0.05)}
+MIDDLE: Final[Variant] = {**REFERENCES[UNIFORM], "explore": "returning"}
 # SGIM-D with a forward model that answers once it predicts as well as `process`, and with one that answers untested.
 MODEL: Final[dict[str, Variant]] = {
     "sgim-d-model": {**SGIM_D, "inverse": "model", "search": "gradient"},
@@ -159,7 +158,7 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
             "cma-me-tuned": {"algorithm": "cma-me", "sd": 0.05},
             "cma-mae-taught-tuned": {"algorithm": "cma-mae-taught", "sd": 0.05},
             "home-babbling": {"algorithm": "experiments.rivals:home_babbling"},
-            "random-middle": {**MIDDLE, "inverse": "process", "global_range": (1.0, 1.0)},
+            "random-middle": {**MIDDLE, "inverse": "process", "explore.first": 1_000_000},
             "map-elites-middle": {"algorithm": "experiments.rivals:map_elites_middle"},
             "middle": MIDDLE,
             "middle-process": {**MIDDLE, "inverse": "process"},
@@ -176,7 +175,6 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
             for name, line in {
                 "practice": PRACTICE,
                 "practice-wide": WIDE,
-                "practice-middle": NARROW,
                 "practice-interest": {**PRACTICE, "goals": "interest-map"},
                 "practice-taught-every-30": {
                     "algorithm": "practice-taught",
@@ -187,7 +185,7 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
             }.items()
         },
         "practice-taught": {**TAUGHT, **WHOLE, **FLOOR},
-        **_on_tasks({"practice": PRACTICE, "practice-middle": NARROW}, TASKS),
+        **_on_tasks({"practice": PRACTICE}, TASKS),
         **_on_tasks({"practice-wide": WIDE}, (task for task in TASKS if task not in SPARSE)),
     },
     "asking": {
@@ -210,8 +208,8 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
 VARIANTS: Final = {name: line for variants in EXPERIMENTS.values() for name, line in variants.items()}
 # Seeds of each experiment. They were first used after the defaults had been frozen.
 SEEDS: Final = {
-    **dict.fromkeys(EXPERIMENTS, range(245, 250)),
-    **dict.fromkeys(("paper", "letter", "rivals", "practice"), range(245, 255)),
+    **dict.fromkeys(EXPERIMENTS, range(260, 270)),
+    **dict.fromkeys(("paper", "letter", "rivals"), range(260, 280)),
 }
 # The second table, beside results.csv, that gets rows from the runs of an experiment.
 SMALL_TABLES: Final = {"asking": "asked.csv", **dict.fromkeys(("paper", "letter", "large"), "explored.csv")}

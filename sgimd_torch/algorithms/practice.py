@@ -29,7 +29,6 @@ PRACTICE: Final[dict[str, Any]] = {
     "search": Vary,
     "explore": Returning,
     "budget": 1,
-    "global_range": (0.05, 0.05),
 }
 """Parts and options of `GoalBabbling` that make it practice."""
 ONCE: Final = partial(Imitate, repeats=1)

@@ -125,8 +125,8 @@ def solve_transposed(lower: Array, b: Array) -> None:
 
 
 @jit_helper
-def fitted_process(inputs: Array, outcomes: Array, kernel: Array) -> GaussianProcess:
-    """The process of movements with ``inputs`` ``(dim, n)`` and ``outcomes`` ``(outcome_dim, n)``.
+def fitted_process(inputs: Array, outcomes: Array, kernel: Array) -> tuple[GaussianProcess, Array]:
+    """The process of movements with ``inputs`` ``(dim, n)`` and ``outcomes`` ``(outcome_dim, n)``; its `precisions`.
 
     The movement that all others contradict most gets the noise that explains it, then the next one, until none is
     contradicted. So gross errors, such as those of a camera that loses the object, hardly count. A movement far from
@@ -136,7 +136,7 @@ def fitted_process(inputs: Array, outcomes: Array, kernel: Array) -> GaussianPro
     noises = np.full(n, kernel[3])
     for _ in range(1 + OUTLIERS):
         process = process_with(inputs, outcomes, kernel, covariance, noises)
-        precision = precisions(process.factor, n)
+        precision = precisions(process.factor)
         largest, outlier, usual = 0.0, 0, 0.0
         for j in range(n):
             residual = squared_residual(process, j, precision[j])
@@ -146,7 +146,13 @@ def fitted_process(inputs: Array, outcomes: Array, kernel: Array) -> GaussianPro
         if largest < GROSS * max(1.0, usual):
             break
         noises[outlier] += (largest - 1) / precision[outlier]
-    return process
+    return process, precision
+
+
+@jit_helper
+def process_of(rows: np.ndarray, inputs: Array, outcomes: Array, kernel: Array) -> tuple[GaussianProcess, Array]:
+    """`fitted_process` of the movements in ``rows``."""
+    return fitted_process(as_columns(inputs, rows), as_columns(outcomes, rows), kernel)
 
 
 @jit_helper
@@ -168,16 +174,17 @@ def process_with(inputs: Array, outcomes: Array, kernel: Array, covariance: Arra
 
 
 @jit_helper
-def precisions(factor: Array, n_last: int) -> Array:
-    """Diagonal of the inverse covariance for the last movements; only the last corner of the factor is needed."""
-    first, root, diagonal = len(factor) - n_last, np.zeros((n_last, n_last)), np.zeros(n_last)
-    for i in range(n_last):  # row i of the inverse factor
+def precisions(factor: Array) -> Array:
+    """Diagonal ``(n,)`` of the inverse covariance."""
+    n = len(factor)
+    root, diagonal = np.zeros((n, n)), np.zeros(n)
+    for i in range(n):  # row i of the inverse factor
         for k in range(i):
             for j in range(k + 1):
-                root[i, j] -= factor[first + i, first + k] * root[k, j]
+                root[i, j] -= factor[i, k] * root[k, j]
         for j in range(i):
-            root[i, j] /= factor[first + i, first + i]
-        root[i, i] = 1 / factor[first + i, first + i]
+            root[i, j] /= factor[i, i]
+        root[i, i] = 1 / factor[i, i]
         for j in range(i + 1):
             diagonal[j] += root[i, j] ** 2
     return diagonal
@@ -306,28 +313,29 @@ def answer(
         spreads: ``(theta_dim,)``, standard deviation of each parameter in memory, the unit of the steps.
         box: ``(2, theta_dim)``, corners of the box around all thetas.
     """
-    m, k = len(goal), alike.shape[1]
-    n_judged = min(JUDGED, k)
+    m, (n_starts, k) = len(goal), alike.shape
     covariance, slope = np.empty(k), np.empty(k)
     least, best, outcome, sd = np.inf, linear, goal, 0.0
-    for start in range(len(alike)):
-        rows = alike[start, ::-1].copy()  # the start is the last row, as `precisions` wants
-        process = fitted_process(as_columns(inputs, rows), as_columns(outcomes, rows), kernel)
-        precision = precisions(process.factor, n_judged)
+    for start in range(n_starts):
+        if start == 0 or k < len(inputs):  # else the process of all movements serves every start
+            rows = alike[start]
+            process, precision = process_of(rows, inputs, outcomes, kernel)
         surprise = 0.0  # mean squared residual near the start
-        for j in range(n_judged):
-            surprise += squared_residual(process, k - n_judged + j, precision[j]) / n_judged
+        for row in alike[start, :JUDGED]:
+            j = int(np.argmax(rows == row))
+            surprise += squared_residual(process, j, precision[j]) / min(JUDGED, k)
         inflation = m * max(1.0, surprise)
         scatter = inflation * process.variance * kernel[3]
-        row, theta = rows[-1], thetas[rows[-1]]
+        row = alike[start, 0]
+        theta, j = thetas[row], int(np.argmax(rows == row))
         if len(context):
             covariances(process.inputs, kernel, in_lengths(theta, context, scaling), covariance, slope)
             error = expected_error(process, goal, inflation, covariance, np.inf)
         else:  # posterior of its outcome without noise, given itself and all others
-            noise = process.noises[-1]
-            error = inflation * process.variance * noise * max(1 - noise * precision[-1], 0.0)
+            noise = process.noises[j]
+            error = inflation * process.variance * noise * max(1 - noise * precision[j], 0.0)
             for i in range(m):
-                error += (outcomes[row, i] - noise * process.weights[i, -1] - goal[i]) ** 2
+                error += (outcomes[row, i] - noise * process.weights[i, j] - goal[i]) ** 2
         if start == 0:
             covariances(process.inputs, kernel, in_lengths(linear, context, scaling), covariance, slope)
             error_of_linear = expected_error(process, goal, inflation, covariance, error)
@@ -361,7 +369,7 @@ def predictions(
     covariance, slope = np.empty(near.shape[1]), np.empty(near.shape[1])
     for i in range(n):
         rows, point = near[i].copy(), points[i].copy()
-        process = fitted_process(as_columns(inputs, rows), as_columns(outcomes, rows), kernel)
+        process, _ = process_of(rows, inputs, outcomes, kernel)
         covariances(process.inputs, kernel, point, covariance, slope)
         outcome[i] = expected(process, covariance)
         variances[i] = variance_at(process, covariance)

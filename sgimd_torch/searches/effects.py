@@ -25,7 +25,8 @@ _NEAR: Final = 2.0  # distance from a plateau, in standard deviations, within wh
 _WITHIN: Final = 4.0  # distance from a plateau, in standard deviations, within which all of its points lie
 _ROUNDING: Final = 1e-9  # assumed noise if an environment has none, relative to the spread of outcomes
 _LEAST_NUMBER: Final = 16  # least number of exemplars on a plateau
-_LEAST_SHARE: Final = 0.1  # least share of all exemplars on a plateau
+_MOST: Final = 0.5  # least share of all exemplars on a plateau when it is found
+_LEAST_SHARE: Final = 0.1  # least share later, as more and more movements have an effect
 # Of the points within 4 sd of a plateau, at least this share must lie within 2 sd. Without a plateau, about half do.
 _DENSE: Final = 0.9
 
@@ -82,7 +83,8 @@ class Effects:
             within = distances <= _WITHIN * self._scale
             plateau = self._fit(np.flatnonzero(within))
         n_within, n_near = within.sum(), (distances <= _NEAR * self._scale).sum()
-        is_plateau = n_within >= max(_LEAST_NUMBER, _LEAST_SHARE * n) and n_near >= _DENSE * n_within
+        share = _MOST if self._plateau is None else _LEAST_SHARE
+        is_plateau = n_within >= max(_LEAST_NUMBER, share * n) and n_near >= _DENSE * n_within
         return plateau if is_plateau else None
 
     def _fit(self, rows: np.ndarray) -> Array:

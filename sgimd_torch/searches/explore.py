@@ -15,7 +15,8 @@ from sgimd_torch.spaces import Array, check_count
 
 _POWER: Final = 1.5  # exponent of a uniform number, the size of a movement; half of the movements are below a third
 _ENOUGH: Final = 16  # least number of exemplars with an effect from which an inverse model can learn
-_SHARE: Final = 0.1  # probability of a global movement once there are enough; more make the inverse model less accurate
+_LEAST_SHARE: Final = 0.05  # least probability of a movement that is uniform in Pi
+_GREATEST_SHARE: Final = 0.2  # greatest probability of such a movement after the first movements
 _ANYWHERE: Final = 0.5  # share of the global movements that are uniform in Pi, to find other effects
 _SIMILAR: Final = 10  # number of movements with an effect, in the most similar contexts, of which one is varied
 _FIRST_WIDTH: Final = 0.1  # standard deviation of the first variations, relative to the sides of Pi
@@ -35,11 +36,11 @@ class Anywhere(Explore):
 
 
 class Returning(Explore):
-    """Movements of any size around the middle of Pi; if effects are rare, variations of movements that had an effect.
+    """First around the middle of Pi, then anywhere; if effects are rare, variations of movements that had an effect.
 
-    While every movement has an effect, some movements are uniform in Pi. The others lie between the middle of Pi and a
-    uniform movement, more of them near the middle. With the fishing rod small movements can be predicted and large ones
-    hardly; with most robots large movements teach more.
+    While every movement has an effect, the first movements lie between the middle of Pi and a uniform movement, more of
+    them near the middle: small movements can often be predicted from few exemplars, large ones cannot. Later global
+    movements are uniform in Pi. Their probability is ``first`` / n after n movements, within bounds.
 
     Otherwise movements are uniform in Pi until one has an effect; then half of them are variations of a movement that
     had an effect in a similar context. Forestier et al. (2022) reach goals for an object by variations of movements
@@ -50,13 +51,13 @@ class Returning(Explore):
     Args:
         problem: problem to learn. If its inverse model reports no ``effects``, every movement counts as effective.
         first: number of movements at the start that are global.
-        uniform: share of movements that are uniform in Pi, while every movement has an effect.
+        uniform: share of these that are uniform in Pi.
 
     Raises:
         ValueError: ``first`` is no count, or ``uniform`` no share.
     """
 
-    def __init__(self, problem: Problem, *, first: int = 20, uniform: float = 0.3) -> None:
+    def __init__(self, problem: Problem, *, first: int = 20, uniform: float = 0.0) -> None:
         super().__init__(problem)
         self.first, self.uniform = check_count("first", first, 0), uniform
         if not 0 <= uniform <= 1:
@@ -69,13 +70,15 @@ class Returning(Explore):
             problem.remarks.append(f"exploration does not look for effects: {inverse.__name__} does not report them")
 
     @property
-    def share(self) -> float | None:
-        """Probability of a global movement: 1 for the ``first`` movements, and until 16 movements had an effect, then
-        .1; None if all movements have an effect."""
-        if len(self.problem.memory) < self.first:
+    def share(self) -> float:
+        """Probability of a global movement: 1 for the ``first`` movements, and, if effects are rare, until 16 movements
+        had one. Later on uniform movements have the same probability whether effects are rare or not."""
+        n = len(self.problem.memory)
+        if n < self.first:
             return 1.0
+        uniform = min(max(self.first / n, _LEAST_SHARE), _GREATEST_SHARE) if n else 1.0
         effective = self.problem.inverse.effects()
-        return None if effective is None else _SHARE if len(effective) >= _ENOUGH else 1.0
+        return uniform if effective is None else uniform / _ANYWHERE if len(effective) >= _ENOUGH else 1.0
 
     def __call__(self, context: Array) -> Array:
         """The next movement ``(theta_dim,)``."""
@@ -83,7 +86,8 @@ class Returning(Explore):
         anywhere = policies.sample(self.rng)
         if effective is None:
             middle = (policies.low + policies.high) / 2
-            size = 1.0 if self.rng.random() < self.uniform else self.rng.random() ** _POWER
+            is_uniform = len(self.problem.memory) >= self.first or self.rng.random() < self.uniform
+            size = 1.0 if is_uniform else self.rng.random() ** _POWER
             return policies.clip(middle + size * (anywhere - middle))
         if len(self.problem.memory) > self._seen:  # several robots may move at once
             for theta in self._varied:

@@ -46,7 +46,9 @@ def waves(n: int = 30) -> tuple[Array, Array]:
 
 
 def fitted(inputs: Array, outcomes: Array, kernel: Kernel) -> kernels.GaussianProcess:
-    return kernels.fitted_process(np.ascontiguousarray(inputs.T), np.ascontiguousarray(outcomes.T), np.array(kernel))
+    columns = (np.ascontiguousarray(table.T) for table in (inputs, outcomes))
+    process, _ = kernels.fitted_process(*columns, np.array(kernel))
+    return process
 
 
 def predicted(inputs: Array, outcomes: Array, kernel: Kernel, point: Array) -> tuple[Array, float]:
@@ -96,7 +98,7 @@ def test_steps_reach_the_goal_where_the_process_can_reach_it(kernel: Kernel) -> 
 def test_an_outcome_without_its_noise_is_what_the_process_predicts_there() -> None:
     inputs, outcomes = waves()
     process = fitted(inputs, outcomes, ROUGH)
-    precision = kernels.precisions(process.factor, 5)
+    precision = kernels.precisions(process.factor)[-5:]
     for row in range(25, 30):
         expected, doubt = predicted(inputs, outcomes, ROUGH, inputs[row])
         assert outcomes[row] - ROUGH.noise * process.weights[:, row] == pytest.approx(expected)
@@ -107,7 +109,7 @@ def test_weights_and_precisions_give_the_error_of_predicting_each_from_all_other
     inputs, outcomes = waves()
     outcomes -= outcomes.mean(axis=0)
     process = fitted(inputs, outcomes, ROUGH)
-    precision = kernels.precisions(process.factor, 5)
+    precision = kernels.precisions(process.factor)[-5:]
     for row in range(25, 30):
         others = np.delete(np.arange(30), row)
         covariance = covariances(ROUGH, np.linalg.norm(inputs[:, None] - inputs, axis=2)) + ROUGH.noise * np.eye(30)

@@ -42,7 +42,7 @@ def test_movements_lie_in_pi_and_come_from_the_stream_alone(word):
 
 @pytest.mark.parametrize("uniform", [0.0, 0.3, 1.0])
 def test_movements_lie_between_the_middle_and_a_uniform_one_and_more_of_them_near_the_middle(uniform):
-    _, thetas = explored(partial(Returning, uniform=uniform), 4000)
+    _, thetas = explored(partial(Returning, first=4000, uniform=uniform), 4000)
     sizes = np.abs(2 * (thetas - POLICIES.low) / POLICIES.sides - 1).max(axis=1)  # 0: the middle, 1: the border
     assert thetas.mean(axis=0) == pytest.approx([1.0, 5.0], abs=0.2)
     # u^1.5 is below .35355 half of the time; the largest of two uniform numbers has the median sqrt(.5).
@@ -136,7 +136,7 @@ def test_without_a_plateau_answers_and_exploration_are_the_usual_ones():
     goal = np.array([0.3, 0.4])
     assert np.array_equal(ours.inverse(NO_CONTEXT, goal).theta, usual.inverse(NO_CONTEXT, goal).theta)
     explore, plain = Returning(ours), Returning(usual)
-    assert explore.share is None
+    assert explore.share == 0.1  # 20 of the 200 movements so far
     assert all(np.array_equal(explore(NO_CONTEXT), plain(NO_CONTEXT)) for _ in range(20))
 
 
@@ -150,7 +150,28 @@ def test_returning_is_uniform_until_a_movement_has_an_effect_and_then_half_aroun
     around = np.array([explore(np.zeros(1)) for _ in range(200)])
     assert (np.abs(around - [0.1, 0.9, 0.5]).max(axis=1) < 0.25).mean() == pytest.approx(0.5, abs=0.15)
     presses(200, memory=memory)
-    assert explore.share == 0.1  # enough effects to learn from
+    assert explore.share == 2 * 20 / 251  # enough effects to learn from
+
+
+def test_after_the_first_movements_global_ones_are_uniform_and_ever_less_frequent():
+    memory, rng = Memory(0, 2, 1), np.random.default_rng(0)
+    explore, shares = Returning(problem(policies=POLICIES, memory=memory, inverse=AmongEffects)), {}
+    for n in range(1001):
+        shares[n] = explore.share
+        theta = POLICIES.sample(rng)
+        memory.add([], theta, theta[:1])
+    assert [shares[n] for n in (0, 19, 20, 100, 200, 400, 1000)] == [1.0, 1.0, 0.2, 0.2, 0.1, 0.05, 0.05]
+    thetas = np.array([explore(NO_CONTEXT) for _ in range(400)])
+    assert thetas.std(axis=0) == pytest.approx(POLICIES.sides / np.sqrt(12), rel=0.1)
+
+
+def test_a_plateau_holds_most_movements_when_it_is_found_and_a_tenth_of_them_later():
+    some, most = presses(60, pressed=0.6), presses(60, pressed=0.4)
+    assert Effects(some, 0.0)() is None
+    effects = Effects(most, 0.0)
+    assert effects() is not None
+    presses(240, pressed=0.85, memory=most)
+    assert effects() is not None
 
 
 def test_returning_varies_movements_of_similar_contexts():
