@@ -13,7 +13,6 @@ import numpy as np
 from sgimd_torch.parts import Explore, Inverse, Problem
 from sgimd_torch.spaces import Array, check_count
 
-_POWER: Final = 1.5  # exponent of a uniform number, the size of a movement; half of the movements are below a third
 _ENOUGH: Final = 16  # least number of exemplars with an effect from which an inverse model can learn
 _LEAST_SHARE: Final = 0.05  # least probability of a movement that is uniform in Pi
 _GREATEST_SHARE: Final = 0.2  # greatest probability of such a movement after the first movements
@@ -38,8 +37,8 @@ class Anywhere(Explore):
 class Returning(Explore):
     """First around the middle of Pi, then anywhere; if effects are rare, variations of movements that had an effect.
 
-    While every movement has an effect, the first movements lie between the middle of Pi and a uniform movement, more of
-    them near the middle: small movements can often be predicted from few exemplars, large ones cannot. Later global
+    While every movement has an effect, the first movements are a uniform share of the way from the middle of Pi to a
+    uniform movement: small movements can often be predicted from few exemplars, large ones cannot. Later global
     movements are uniform in Pi. Their probability is ``first`` / n after n movements, within bounds.
 
     Otherwise movements are uniform in Pi until one has an effect; then half of them are variations of a movement that
@@ -87,7 +86,7 @@ class Returning(Explore):
         if effective is None:
             middle = (policies.low + policies.high) / 2
             is_uniform = len(self.problem.memory) >= self.first or self.rng.random() < self.uniform
-            size = 1.0 if is_uniform else self.rng.random() ** _POWER
+            size = 1.0 if is_uniform else self.rng.random()
             return policies.clip(middle + size * (anywhere - middle))
         if len(self.problem.memory) > self._seen:  # several robots may move at once
             for theta in self._varied:
