@@ -17,7 +17,7 @@ from judging import MISSING, Claim, Verdict, judge
 from refinement import ROBOTS, SEARCHES, TABLE
 from sgimd_torch.views.statistics import interquartile_mean, interval_text
 from suite import TASKS, UNIFORM, titled
-from table import read_table
+from table import LEARNING, read_table
 from variants import ARMS, EXPERIMENTS, VARIANTS
 
 MISSING_CELL: Final = "–"
@@ -94,6 +94,22 @@ class Page:
         except NotRun:
             return MISSING_CELL
         return f"{seeds.min()} to {seeds.max()}"
+
+    def older(self, *groups: str) -> str:
+        """A sentence that names the groups of rows that other learning has made, wholly or in part; or nothing."""
+        learning = {
+            "robots": self.evidence.robots["learning"],
+            "changes": self.evidence.changes["learning"],
+            **{name: self.evidence.of_variants(variants) for name, variants in EXPERIMENTS.items()},
+        }
+        shares = {name: (learning[name] != LEARNING).mean() for name in groups if len(learning[name])}
+        all_of = {1.0: "all"}
+        older = [
+            f"{all_of.get(share, f'{share:.0%}'.replace('%', ' %'))} of `{name}`"
+            for name, share in shares.items()
+            if share
+        ]
+        return f"**Not made by this version, but by an earlier one**: {', '.join(older)}." if older else ""
 
     def ratio(self, ours: str, theirs: str, at: int = LAST) -> str:
         """Our error divided by theirs, with the interval of this ratio."""

@@ -10,12 +10,13 @@ import claims
 import refinement
 from claims import PAGES, README, TEMPLATES, filled, main
 from evidence import LAST, Evidence
-from made_up import write, write_rows
+from made_up import row, write, write_rows
+from page_tables import Page
 from refinement import TABLE
 from runs import ROOT
 from sgimd_torch.options.command_line import parse
 from sgimd_torch.runs.signals import command
-from table import read_table
+from table import LEARNING, read_table
 from variants import VARIANTS
 
 SHIPPED = ROOT / "results"
@@ -102,6 +103,16 @@ def test_a_readme_without_a_section_of_results_is_refused_and_no_page_made(tmp_p
     assert not Path("results").exists()
 
 
+def test_a_page_names_the_groups_whose_rows_are_not_all_of_this_learning(tmp_path):
+    write_rows(tmp_path)
+    rows = [row("random", seed, 5000, "process", 0.1, learning="older" if seed else LEARNING) for seed in range(4)]
+    rows.append(row("sgim-d-letter", 0, 5000, "process", 0.1, learning="older"))
+    page = Page(Evidence.of(write(tmp_path, rows)), tmp_path)
+    said = "**Not made by this version, but by an earlier one**: 75 % of `paper`, all of `letter`."
+    assert page.older("paper", "letter", "large", "robots") == said
+    assert Page(Evidence.of(write(tmp_path, rows[:1])), tmp_path).older("paper") == ""
+
+
 def test_what_was_not_run_is_left_out_of_a_table_and_named(tmp_path):
     found = Evidence.of(write_rows(tmp_path, without=["practice-interest"]))
     text, page = filled("LEARNING", found, tmp_path)
@@ -158,8 +169,8 @@ def test_the_page_of_searches_has_errors_over_those_of_the_simplex_and_the_cost_
 def test_searches_side_by_side_have_the_lives_that_each_has_alone(monkeypatch):
     monkeypatch.setattr(refinement, "WARM", 1)
     ticks = count()  # every movement takes as long, so equal time is equal movements
-    rows = refinement.trio(ROBOT, 3, movements=120, clock=lambda: next(ticks))
-    alone = refinement.Life({**refinement.ROBOTS[ROBOT], "search": "gradient", "seed": 3}, 120, lambda: 0)
+    rows = refinement.life(ROBOT, 3, movements=120, clock=lambda: next(ticks))
+    alone = refinement.TimedLife({**refinement.ROBOTS[ROBOT], "search": "gradient", "seed": 3}, 120, lambda: 0)
     for _ in range(120):
         alone.move()
     assert rows["gradient"] == (120, 120, alone.now()[2], 119, 119, rows["gradient"][-1])
