@@ -40,7 +40,6 @@ TABLES: Final[dict[str, tuple[int, tuple[str, ...]]]] = {
     FILE: (4, ("variant", "seed", "movements", "answer", "task", "error", "floor", "learning")),
     "explored.csv": (2, ("variant", "seed", "tiles", "goals", "near", "learning")),
     "asked.csv": (3, ("variant", "seed", "teacher", *_ASKED, "learning")),
-    "rivals.csv": (4, ("rival", "setting", "seed", "movements", "linear", "process")),
     "robots.csv": (4, ("number", "learner", "seed", "movements", "error", "noticed", "learning")),
     "model_files.csv": (3, ("file", "outcome", "options", "version", "told", "words", "practice", "random", *_RATIO)),
     "refinement.csv": (
@@ -51,7 +50,7 @@ TABLES: Final[dict[str, tuple[int, tuple[str, ...]]]] = {
 }
 TYPES: Final = {  # types of columns; all other columns have floats, and an empty field is NaN
     **dict.fromkeys(("number", "seed", "movements", "movements_then", "tiles", *_ASKED), "int64"),
-    **dict.fromkeys(("variant", "task", "answer", "teacher", "rival", "setting", "learner", "learning"), "str"),
+    **dict.fromkeys(("variant", "task", "answer", "teacher", "learner", "learning"), "str"),
     **dict.fromkeys(("robot", "change", "search", "file", "outcome", "options", "version", "told", "words"), "str"),
     **dict.fromkeys(("goals", "near", "noticed"), "Int64"),  # with empty fields
 }
