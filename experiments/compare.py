@@ -46,7 +46,7 @@ NAMES: Final[dict[str, Collection[str]]] = {
     "robots": random_robots.LEARNERS,
     "changes": (*changing.ROBOTS, changing.ARM),
 }
-# Processor time (ms) of a movement, evaluations included: estimates, to say how much is left. The order is that of runs.
+# Estimates of processor time (ms) of a movement, evaluations included. The order is that in which runs are made.
 COST: Final = {
     "paper": 6.0,
     "letter": 7.0,

@@ -208,8 +208,8 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
     },
 }
 VARIANTS: Final = {name: line for variants in EXPERIMENTS.values() for name, line in variants.items()}
-# Seeds of each experiment, set out before the first was used: twenty where the paper's claims are judged, else ten; five
-# for the ladder, on which there is no claim.
+# Seeds of each experiment, set out before the first was used: twenty where the paper's claims are judged, else ten;
+# five for the ladder, on which there is no claim.
 SEEDS: Final = {
     **dict.fromkeys(EXPERIMENTS, range(260, 270)),
     **dict.fromkeys(("paper", "letter", "rivals"), range(260, 280)),
