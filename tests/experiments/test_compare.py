@@ -134,7 +134,7 @@ def test_a_run_that_ended_without_its_last_evaluation_is_no_result(go, benchmark
         (["--seeds", ""], "--seeds: must be like 5, 0-19 or 0,3,7-9, got ''"),
         (["--seeds=-1"], "--seeds: must be like 5, 0-19 or 0,3,7-9, got '-1'"),
         (["--processes", "0"], "--processes: must be a whole number of at least 1, got '0'"),
-        (["--out", "file/runs"], "file/runs/demonstrations cannot be made: Not a directory"),
+        (["--out", "file/runs"], f"file/runs/{LEARNING}/demonstrations cannot be made: Not a directory"),
         (["--results", "file"], "file cannot be made: File exists; is a file in its place?"),
         (["--results", "foreign"], "foreign/results.csv.*must begin with variant,seed"),
     ],
