@@ -8,7 +8,7 @@ are compared as independent samples.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -45,8 +45,7 @@ class Evidence:
     Args:
         rows: results.csv with the index answer, variant, movements and seed.
         explored, asked: tables explored.csv and asked.csv, with the index variant and seed.
-        random: table random.csv.
-        repeated: table repeated.csv.
+        robots: table robots.csv.
         changes: table changes.csv with the index robot, change, learner, movements and seed.
         models: table model_files.csv.
     """
@@ -54,8 +53,7 @@ class Evidence:
     rows: pd.DataFrame
     explored: pd.DataFrame
     asked: pd.DataFrame
-    random: pd.DataFrame
-    repeated: pd.DataFrame
+    robots: pd.DataFrame
     changes: pd.DataFrame
     models: pd.DataFrame
 
@@ -67,12 +65,12 @@ class Evidence:
             ResultsError: a table is damaged.
         """
         key = ["answer", "variant", "movements", "seed"]
-        rows = read_table(folder).set_index(key)[["error", "floor"]].sort_index()
+        rows = read_table(folder).set_index(key)[["error", "floor", "learning"]].sort_index()
         explored, asked = (read_table(folder, name).set_index("variant") for name in ("explored.csv", "asked.csv"))
         after = ["robot", "change", "learner", "movements", "seed"]
         changes = read_table(folder, "changes.csv").set_index(after).sort_index()
-        random, repeated, models = (read_table(folder, f"{name}.csv") for name in ("random", "repeated", "model_files"))
-        return cls(rows, explored, asked, random, repeated, changes, models)
+        robots, models = (read_table(folder, f"{name}.csv") for name in ("robots", "model_files"))
+        return cls(rows, explored, asked, robots, changes, models)
 
     def at(self, name: str, movements: int = LAST, column: str = "error") -> pd.Series:
         """Errors (m) by seed after a number of movements; noise floors (m) if the column is "floor"."""
@@ -80,6 +78,10 @@ class Evidence:
         place = (answer or "process", variant, movements)
         errors = self.rows.loc[place, column].dropna() if place in self.rows.index else pd.Series(dtype=float)
         return _two_or_more(errors, f"{name} at {movements}")
+
+    def of_variants(self, variants: Iterable[str]) -> pd.Series:
+        """By which learning each row of these variants was made."""
+        return self.rows["learning"][self.rows.index.isin([*variants], level="variant")]
 
     def curve(self, name: str) -> pd.DataFrame:
         """Errors (m): a row for each seed, a column for each number of movements; incomplete seeds are left out."""

@@ -4,7 +4,7 @@
   paper       the paper's five learners, in its task space and in the larger one    (RESULTS)
   gain        error after each step from random movements to practice               (GAIN)
   curiosity   error with goals by interest, divided by the error with uniform goals (CURIOSITY)
-  shares      random robots on which each learner is best, and on which it harms     (ANY_ROBOT)
+  shares      random robots on which each learner is best, and that practice harms    (ANY_ROBOT)
   profile     random robots on which an error is within a factor of the smallest     (ANY_ROBOT)
   kinds       error over that of random movements, by family and by noise            (ANY_ROBOT)
   changes     error after a change, divided by the error of starting anew             (CHANGES)

@@ -1,60 +1,70 @@
-"""Lives that are no runs of `sgimd run`: several processes make them, and a table in results/ keeps their rows.
+"""Lives that are no runs of `sgimd run`: jobs of a sweep, each of which leaves the rows of a table in a file.
 
-    make_lives(Path("results"), "random.csv", life, {(200, "practice"): 1000}, processes=2)
-A life that is in the table is not made again. After Ctrl-C or a power cut, only the lives of that moment are lost.
+    failures = sweep([Life("robots.csv", (500, "practice", 260), 1000)], Machine(2), on_end=partial(collect, results))
+A life that was stopped begins again, as its movements are not recorded.
 """
 
 from __future__ import annotations
 
-import argparse
-import signal
-from collections.abc import Callable, Mapping
-from functools import partial
-from multiprocessing import get_context
+import json
+import sys
+from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
 
-from sgimd_torch.runs.signals import Progress, say
-from table import TABLES, merge, read_table
+from sgimd_torch.files import write_text
+from table import TABLES, merge
 
-MakeLife = Callable[..., Mapping[Any, tuple[float, ...]]]
-"""Function of a key that returns the rows of a life: by the last part of a row's key, such as its number of movements,
-the other columns, such as the error and how many changes were noticed by then."""
-_LATE: Final = -1  # the key of a row ends with what differs between the rows of a life
+HERE: Final = str(Path(__file__).parent)
+MAKERS: Final = {"robots.csv": "random_robots", "changes.csv": "changing", "refinement.csv": "refinement"}
+"""Module of a table, with a function life(*key) -> the other columns of a row, by the last part of its key."""
 
 
-def make_lives(
-    folder: Path, name: str, make_life: MakeLife, lives: Mapping[tuple[Any, ...], int], processes: int
-) -> None:
-    """Make the lives that the table lacks, and show progress.
+@dataclass(frozen=True)
+class Life:
+    """A job of a sweep.
 
     Args:
-        folder: folder of the table.
-        name: file name of the table.
-        make_life: function that makes a life.
-        lives: number of movements of each life, by key; a key has the first columns of the table.
-        processes: number of lives at a time.
+        table: file name of the table of its rows.
+        key: first columns of these rows.
+        movements: number of movements.
+        out: folder of all runs.
     """
-    n_key, columns = TABLES[name]
-    known = {*read_table(folder, name)[[*columns[: n_key + _LATE]]].itertuples(index=False, name=None)}
-    left, done = [key for key in lives if key not in known], 0
-    say(f"{name}: {len(lives)} lives, {len(lives) - len(left)} of them made already")
-    # Spawned, because a forked process would share the locks of this one's threads.
-    pool = get_context("spawn").Pool(processes, signal.signal, (signal.SIGINT, signal.SIG_IGN))
-    with pool, Progress(name, sum(map(lives.__getitem__, left))) as progress:
-        for n, (key, made) in enumerate(pool.imap_unordered(partial(_made, make_life), left), 1):
-            merge(folder, name, [dict(zip(columns, (*key, at, *errors), strict=True)) for at, errors in made.items()])
-            done += lives[key]
-            progress.show(done, f"{n} of {len(left)} lives")
+
+    table: str
+    key: tuple[Any, ...]
+    movements: int
+    out: Path = Path("runs")
+
+    @property
+    def title(self) -> str:
+        return " ".join(map(str, self.key))
+
+    @property
+    def directory(self) -> Path:
+        return self.out / self.table.removesuffix(".csv") / self.title / "life"
+
+    @property
+    def program(self) -> tuple[str, ...]:
+        asked = json.dumps([self.table, self.key, str(rows_of(self).absolute())])
+        return f"import sys; sys.path.insert(0, {HERE!r}); import lives; sys.exit(lives.live())", asked
 
 
-def parser(about: str | None) -> argparse.ArgumentParser:
-    """A parser of the options that all scripts that make lives have."""
-    made = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
-    made.add_argument("--results", type=Path, default=Path("results"), help="folder of the table (default: results)")
-    made.add_argument("--processes", type=int, default=2, help="number of lives at a time (default: 2)")
-    return made
+def live() -> int:
+    """In the process of a life: make it, and write its rows."""
+    table, key, path = json.loads(sys.argv[1])
+    made = import_module(MAKERS[table]).life(*key)
+    rows = [dict(zip(TABLES[table][1], (*key, at, *numbers), strict=False)) for at, numbers in made.items()]
+    write_text(path, json.dumps(rows))
+    return 0
 
 
-def _made(make_life: MakeLife, key: tuple[Any, ...]) -> tuple[tuple[Any, ...], Mapping[Any, tuple[float, ...]]]:
-    return key, make_life(*key)
+def rows_of(life: Life) -> Path:
+    """The file of a life's rows."""
+    return life.directory.with_suffix(".json")
+
+
+def collect(results: Path, life: Life) -> None:
+    """Merge the rows of a life that has ended into their table."""
+    merge(results, life.table, json.loads(rows_of(life).read_text(encoding="utf-8")))

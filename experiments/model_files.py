@@ -11,6 +11,7 @@ movements learn it. The words that have to be told are in ``FILES``, too, by rea
 
 from __future__ import annotations
 
+import argparse
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -22,7 +23,6 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from scipy import stats
 
-from lives import parser
 from sgimd_torch.environments.protocol import FromFiles
 from sgimd_torch.files import make_folder
 from sgimd_torch.options.build import task_of
@@ -30,6 +30,7 @@ from sgimd_torch.options.config import Config
 from sgimd_torch.runs.parallel import Machine, sweep
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.signals import command, say
+from sgimd_torch.runs.sweep import cores
 from sgimd_torch.views.statistics import LEVEL
 from table import TABLES, Row, merge, read_table
 
@@ -197,7 +198,8 @@ def errors(configs: Sequence[Config]) -> dict[str, float]:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Make the rows that the table lacks; returns the exit code, 1 if a run failed."""
-    options = parser(__doc__)
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("--results", type=Path, default=Path("results"), help="folder of the table (default: results)")
     options.add_argument("folders", nargs="+", type=Path, metavar="FOLDER", help="folder with installed packages")
     options.add_argument("--out", type=Path, default=Path("runs/model-files"), help="folder of the runs")
     chosen = options.parse_args(argv)
@@ -218,7 +220,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         say(f"{n} of {len(FILES)}: {file.path} {file.outcome} {row['told']} {row['words']}")
         if row["told"] == RIGHT:
             configs = lives(file, path, chosen.out)
-            if failed := sweep(configs, Machine(chosen.processes)):
+            if failed := sweep(configs, Machine(cores())):
                 failures += failed
             else:
                 merge(chosen.results, TABLE, [row | errors(configs)])

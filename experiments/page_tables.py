@@ -17,7 +17,7 @@ from judging import MISSING, Claim, Verdict, judge
 from refinement import ROBOTS, SEARCHES, TABLE
 from sgimd_torch.views.statistics import interquartile_mean, interval_text
 from suite import TASKS, UNIFORM, titled
-from table import read_table
+from table import LEARNING, read_table
 from variants import ARMS, EXPERIMENTS, VARIANTS
 
 MISSING_CELL: Final = "–"
@@ -94,6 +94,19 @@ class Page:
         except NotRun:
             return MISSING_CELL
         return f"{seeds.min()} to {seeds.max()}"
+
+    def older(self, *groups: str) -> str:
+        """A sentence that names the groups of rows that an earlier version has made, wholly or in part; or nothing."""
+        learning = {
+            "robots": self.evidence.robots["learning"],
+            "changes": self.evidence.changes["learning"],
+            **{name: self.evidence.of_variants(variants) for name, variants in EXPERIMENTS.items()},
+        }
+        shares = {name: (learning[name] != LEARNING).mean() for name in groups if len(learning[name])}
+        if not any(shares.values()):
+            return ""
+        older = [f"{share:.0%} of `{name}`".replace("%", " %") for name, share in shares.items() if share]
+        return f"**{'All rows' if min(shares.values()) == 1 else ', '.join(older)}: made by an earlier version.**"
 
     def ratio(self, ours: str, theirs: str, at: int = LAST) -> str:
         """Our error divided by theirs, with the interval of this ratio."""
@@ -218,25 +231,6 @@ class Page:
                 demonstrations = self.cell(self.evidence.count, "asked", name, "shown", form=".0f")
             rows.append([f"`{name}`", *self.errors(name, (1000, LAST)), demonstrations])
         return markdown(("learner", "1000", "5000", "shown"), rows)
-
-    def tuned(self) -> str:
-        """Errors (m) of each rival with its default setting and with the best setting of the first round.
-
-        One column has the seeds of the first round, the other has later seeds.
-        """
-        table = read_table(self.folder, "rivals.csv")
-        first, later = (
-            half.groupby(["rival", "setting"])[["linear", "process"]].mean()
-            for half in (table[(table.movements == LAST) & rows] for rows in (table.seed < 1002, table.seed >= 1002))
-        )
-        best = first.mean(axis=1).groupby("rival").idxmin()
-        places = [place for rival in table.rival.unique() for place in dict.fromkeys([(rival, "default"), best[rival]])]
-        rows = [
-            [*(f"`{name}`" for name in place),
-             *(f"{half.process[place]:.4f}" if place in half.index else MISSING_CELL for half in (first, later))]
-            for place in places
-        ]  # fmt: skip
-        return markdown(("rival", "setting", "first seeds", "later seeds"), rows)
 
     def _over_tasks(self, name: str, tasks: Sequence[str], at: int) -> str:
         names = [[on(learner, task) for task in tasks] for learner in (name, "random")]

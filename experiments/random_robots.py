@@ -1,23 +1,21 @@
 """Robots made at random, on which no default was chosen: how well learners do on them, beside random movements.
 
-    experiments/random_robots.py                                        the lives of the page ANY_ROBOT
-    experiments/random_robots.py --robots 0 36 --results development    others, in a table of your own
-    experiments/random_robots.py --repeated                             five lives on each robot: a fair measure of harm
+    experiments/compare.py robots                                            the lives of the page ANY_ROBOT
+    experiments/compare.py robots --seeds 0-35 --only practice random --results development    other robots
 
 Nine families: planar and spatial chains, poses (which fill a thin part of their box), smooth and rugged maps, throws,
 maps that do nothing in half of Pi, contexts, periodic parameters. Units go from mm to km. Noise is absent, even,
 grows with the movement, or is one gross error in 33 movements.
 
-Numbers 0 to 199 are for development; 200 to 319 were seen before practice was what it is now. Each error is the mean
-distance between goals and what the answers do without noise. For the references the better of `process` and the nearest
-exemplar answers.
+Numbers 0 to 199 are for development; others below 500 and 600 to 697 were seen before the defaults were what they are.
+Each error is the mean distance between goals and what the answers do without noise. `process` answers; for the standard
+baseline the better of `process` and the nearest exemplar.
 """
 
 from __future__ import annotations
 
 import math
-import sys
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -26,7 +24,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lives import make_lives, parser
+from lives import Life
 from sgimd_torch.algorithms.paper import random_exploration, sagg_riac
 from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.goals.interest_map import InterestMap
@@ -35,7 +33,6 @@ from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.learner import Learner
 from sgimd_torch.parts import Inverse
-from sgimd_torch.runs.signals import command
 from sgimd_torch.searches.explore import Returning
 from sgimd_torch.searches.perturb import Perturb
 from sgimd_torch.session import run
@@ -44,11 +41,8 @@ from sgimd_torch.spaces import Array, Box
 FAMILIES: Final = ("chain", "spatial", "pose", "smooth", "rugged", "throw", "idle", "context", "phases")
 NOISES: Final = ("none", "even", "speed", "gross")
 COUNTS: Final = (50, 100, 250, 500, 1000)  # movements at which a learner is evaluated
-UNSEEN: Final = range(320, 380)  # robots of the page ANY_ROBOT, named before the first of them was run
-TABLE: Final = "random.csv"
-REPEATED: Final = range(460, 490)  # robots that are learnt once by each of the `SEEDS`, named before the first was run
-SEEDS: Final = range(265, 270)
-REPEATED_TABLE: Final = "repeated.csv"
+ROBOTS: Final = range(500, 560)  # robots of the page ANY_ROBOT, named before the first of them was run
+TABLE: Final = "robots.csv"
 RANDOM: Final = "random"  # reference: random movements
 BASELINE: Final = "uniform-nearest"  # reference: the standard baseline
 LEARNERS: Final[Mapping[str, Callable[[RandomRobot, int], Learner]]] = {
@@ -59,6 +53,9 @@ LEARNERS: Final[Mapping[str, Callable[[RandomRobot, int], Learner]]] = {
     BASELINE: partial(sagg_riac, goals=UniformGoals, inverse=NearestNeighbour, search=Perturb, budget=1),
     RANDOM: random_exploration,
 }
+# Seeds of each learner on each robot: five, so that harm can be judged by robot, twice as many for random movements,
+# so that two equal learners can be compared, and one for the others.
+SEEDS: Final = {**dict.fromkeys(LEARNERS, range(260, 261)), "practice": range(260, 265), RANDOM: range(260, 270)}
 
 
 def kind(number: int) -> tuple[str, str, np.random.Generator]:
@@ -158,57 +155,21 @@ class RandomRobot:
         return float(np.mean(missed) / np.linalg.norm(self.goals - self.goals.mean(axis=0), axis=1).mean())
 
 
-def life(number: int, name: str) -> dict[int, tuple[float, int]]:
+def life(number: int, name: str, seed: int) -> dict[int, tuple[float, int]]:
     """Errors of the learner with this ``name`` on the robot with this ``number``, and the changes that it noticed."""
     robot = RandomRobot(number)
-    learner = LEARNERS[name](robot, number)
-    references: list[Inverse] = [LocalProcess(learner.problem), NearestNeighbour(learner.problem)]
-    answers = references if name in (RANDOM, BASELINE) else [learner.inverse]
-    return {at: (error, len(learner.changes)) for at, error in errors(robot, learner, number, answers)}
-
-
-def repeated_life(number: int, name: str, seed: int) -> dict[int, tuple[float]]:
-    """Errors of a life with this ``seed``, answered by `process`."""
-    robot = RandomRobot(number)
     learner = LEARNERS[name](robot, seed)
-    answer = LocalProcess(learner.problem) if name == RANDOM else learner.inverse
-    return {at: (error,) for at, error in errors(robot, learner, seed, [answer])}
-
-
-def errors(robot: RandomRobot, learner: Learner, seed: int, answers: Sequence[Inverse]) -> Iterator[tuple[int, float]]:
-    """The numbers of movements at which a learner is evaluated, and the least error of the ``answers``."""
+    answers: list[Inverse] = [learner.inverse]
+    if name in (RANDOM, BASELINE):
+        answers = [LocalProcess(learner.problem), *answers][: 1 + (name == BASELINE)]
+    errors = {}
     for episode in run(learner, robot, seed, movements=COUNTS[-1]):
         if (movements := episode.index + 1) in COUNTS:
-            yield movements, min(map(robot.error, answers))
+            errors[movements] = min(map(robot.error, answers)), len(learner.changes)
+    return errors
 
 
-def make(
-    results: Path, processes: int, numbers: Iterable[int] = UNSEEN, learners: Collection[str] = tuple(LEARNERS)
-) -> None:
-    """Make the lives that the table in ``results`` lacks."""
-    lives = {(number, name): COUNTS[-1] for number in numbers for name in learners}
-    make_lives(results, TABLE, life, lives, processes)
-
-
-def make_repeated(results: Path, processes: int) -> None:
-    """Make the lives of each of the `SEEDS` that the table in ``results`` lacks."""
-    lives = dict.fromkeys(product(REPEATED, ("practice", RANDOM), SEEDS), COUNTS[-1])
-    make_lives(results, REPEATED_TABLE, repeated_life, lives, processes)
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    options = parser(__doc__)
-    numbers = "first number of a robot, and the number after the last (default: those of the page)"
-    options.add_argument("--robots", nargs=2, type=int, default=[UNSEEN.start, UNSEEN.stop], help=numbers)
-    options.add_argument("--learners", nargs="+", default=[*LEARNERS], choices=LEARNERS, help="learners (default: all)")
-    options.add_argument("--repeated", action="store_true", help="practice and random movements, five lives a robot")
-    chosen = options.parse_args(argv)
-    if chosen.repeated:
-        make_repeated(chosen.results, chosen.processes)
-        return 0
-    make(chosen.results, chosen.processes, range(*chosen.robots), chosen.learners)
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(command(main))
+def lives(robots: Iterable[int] | None, only: Collection[str], out: Path) -> list[Life]:
+    """The lives on robots with these numbers, None for those of the page, of these learners or of all."""
+    keys = product(ROBOTS if robots is None else robots, only)
+    return [Life(TABLE, (number, name, seed), COUNTS[-1], out) for number, name in keys for seed in SEEDS[name]]

@@ -1,7 +1,6 @@
 """Refinement side by side: three searches around the same answers, at equal movements and at equal time.
 
     experiments/refinement.py                                       the lives of the page FORWARD_MODEL
-    experiments/refinement.py --seeds 1000 1001 --results development
 
 The searches are the simplex of Nguyen & Oudeyer (2014), descents through the forward model, and a simplex that begins
 where a descent ends. The lives of a robot and a seed differ in the search alone. The next movement is always made by
@@ -12,20 +11,24 @@ model and robot; evaluations do not count.
 
 from __future__ import annotations
 
+import argparse
 import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from itertools import product
+from pathlib import Path
 from typing import Any, Final
 
-from lives import make_lives, parser
+from lives import Life, collect
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.options.build import build
 from sgimd_torch.options.catalogue import ROD
 from sgimd_torch.options.config import Config
-from sgimd_torch.runs.signals import command
+from sgimd_torch.runs.parallel import Machine, sweep
+from sgimd_torch.runs.signals import command, say
 from sgimd_torch.session import run
+from table import read_table
 
 SEARCHES: Final = ("nelder-mead", "gradient", "gradient-then-nelder-mead")
 SGIM_D: Final = {"algorithm": "sgim-d", "environment.threads": 1}
@@ -41,7 +44,7 @@ SEEDS: Final = range(260, 265)
 TABLE: Final = "refinement.csv"
 
 
-class Life:
+class TimedLife:
     """Life of a learner, and the ``seconds`` that it has taken."""
 
     def __init__(self, settings: Mapping[str, Any], movements: int, clock: Callable[[], float]) -> None:
@@ -68,16 +71,16 @@ class Life:
         return made, self.seconds, evaluation.mean_error
 
 
-def trio(
+def life(
     robot: str, seed: int, *, movements: int = MOVEMENTS, clock: Callable[[], float] = time.process_time
 ) -> dict[str, tuple[float, ...]]:
     """By search: movements, seconds and error at equal movements, then the same at equal time."""
     settings = {search: {**ROBOTS[robot], "search": search, "seed": seed} for search in SEARCHES}
     for chosen in settings.values():
-        warm = Life(chosen, WARM, clock)
+        warm = TimedLife(chosen, WARM, clock)
         for _ in range(WARM):
             warm.move()
-    lives = {search: Life(chosen, movements, clock) for search, chosen in settings.items()}
+    lives = {search: TimedLife(chosen, movements, clock) for search, chosen in settings.items()}
     while all(life.learner.movements < movements for life in lives.values()):
         min(lives.values(), key=lambda life: life.seconds).move()
     at_equal_time = {search: life.now() for search, life in lives.items()}
@@ -87,16 +90,14 @@ def trio(
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    options = parser(__doc__)
-    options.add_argument("--robots", nargs="+", default=[*ROBOTS], choices=ROBOTS, help="robots (default: all)")
-    options.add_argument("--seeds", nargs="+", type=int, default=[*SEEDS], help="seeds (default: those of the page)")
-    options.add_argument("--movements", type=int, default=MOVEMENTS, help="movements of a life (default: %(default)s)")
-    options.set_defaults(processes=1)
-    chosen = options.parse_args(argv)
-    n_movements = len(SEARCHES) * chosen.movements
-    lives = {(robot, seed): n_movements for seed, robot in product(chosen.seeds, chosen.robots)}
-    make_lives(chosen.results, TABLE, partial(trio, movements=chosen.movements), lives, chosen.processes)
-    return 0
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("--results", type=Path, default=Path("results"), help="folder of the table (default: results)")
+    results, n_movements = options.parse_args(argv).results, len(SEARCHES) * MOVEMENTS
+    made = {*read_table(results, TABLE)[["robot", "seed"]].itertuples(index=False, name=None)}
+    left = [Life(TABLE, key, n_movements) for key in product(ROBOTS, SEEDS) if key not in made]
+    failures = sweep(left, Machine(1), on_end=partial(collect, results))
+    say(*failures)
+    return 1 if failures else 0
 
 
 if __name__ == "__main__":

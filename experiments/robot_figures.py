@@ -1,4 +1,4 @@
-"""Figures of the pages ANY_ROBOT and CHANGES, from random.csv and changes.csv; figures.py draws them.
+"""Figures of the pages ANY_ROBOT and CHANGES, from robots.csv and changes.csv; figures.py draws them.
 
 figure = shares(Evidence.of(Path("results")))
 """
@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from changing import ANEW, ARM, BEGUN, CHANGES, GOES_ON, ROBOTS, SIMULATOR, WRONG, after
 from evidence import Evidence
 from random_robots import COUNTS, FAMILIES, LEARNERS, NOISES, RANDOM, kind
-from robots import COMPARED, after_change, best, errors, harmful, over_anew, share
+from robots import COMPARED, after_change, best, clearly_harmed, errors, over_anew, share
 from sgimd_torch.figures.names import COLOURS, NAMES
 from sgimd_torch.spaces import Array
 from sgimd_torch.views.statistics import Interval, bootstrap_rng, iqm_interval
@@ -28,12 +28,16 @@ BEGINNINGS: Final = {ANEW: "nothing", GOES_ON: "the simulator", WRONG: "a mirror
 
 
 def shares(evidence: Evidence) -> Figure:
-    """Share of random robots on which each learner is best, and on which it is harmful, against movements."""
-    figure, panels = _panels("learner is best", "worse than random movements")
-    for ax, statistic, learners in zip(panels, (best, harmful), (LEARNERS, COMPARED), strict=True):
-        for name in learners:
-            by_count = [statistic(evidence, name, at) for at in COUNTS]
-            _drawn(ax, COUNTS, by_count, COLOURS[name], NAMES[name], "o-")
+    """Share of random robots on which each learner is best, and which are clearly harmed, against movements."""
+    figure, panels = _panels("learner is best", "clearly worse than random")
+    for name in LEARNERS:
+        by_count = [best(evidence, name, at) for at in COUNTS]
+        _drawn(panels[0], COUNTS, by_count, COLOURS[name], NAMES[name], "o-")
+    for column, name in (("harmed", "practice"), ("equal", RANDOM)):
+        by_count = [clearly_harmed(evidence, at, column) for at in COUNTS]
+        _drawn(panels[1], COUNTS, by_count, COLOURS[name], NAMES[name], "o-")
+    panels[1].text(COUNTS[-1], 0.9, "random: with other seeds", ha="right")
+    for ax in panels:
         ax.set(xscale="log", xlabel="movements executed", ylim=(0, 1))
         _ticks(ax, COUNTS)
     _legend(figure, panels[0])

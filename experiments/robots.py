@@ -1,7 +1,7 @@
 """Robots that nobody tuned on, and robots that change: statistics and claims from their tables of results.
 
     harmful(evidence, "practice", 250); judge(any_robot(evidence)); judge(changes(evidence))
-On random robots, the sample is the robots: each is learnt once by each learner.
+On random robots, the sample is the robots.
 """
 
 from __future__ import annotations
@@ -14,12 +14,13 @@ import pandas as pd
 from scipy import stats
 
 from changing import AFTER, ANEW, ARM, BEGUN, BLIND, GOES_ON, ROBOTS, SIMULATOR, WRONG, after
-from evidence import Evidence, Level, NotRun
+from evidence import Evidence, Level, NotRun, Statistic
 from judging import Claim, Part, at_most
 from model_files import FILES, REFUSED, RIGHT, WARNED
 from page_tables import MISSING_CELL, Page, markdown
 from random_robots import BASELINE, COUNTS, LEARNERS, RANDOM
 from sgimd_torch.figures.names import NAMES
+from sgimd_torch.spaces import Array
 from sgimd_torch.views.statistics import LEVEL, Interval, bootstrap_rng, interval
 
 COMPARED: Final = tuple(name for name in LEARNERS if name != RANDOM)
@@ -30,13 +31,14 @@ MEANS: Final = dict(
 
 
 def errors(evidence: Evidence, at: int) -> pd.DataFrame:
-    """Errors after ``at`` movements: a row for each robot on which every learner has learnt, a column for each learner.
+    """Errors after ``at`` movements, geometric means over seeds: a row for each robot that all learners have learnt.
 
     Raises:
         NotRun: there are fewer than two such robots.
     """
-    rows = evidence.random[evidence.random["movements"] == at]
-    table = rows.pivot(index="number", columns="learner", values="error").reindex(columns=[*LEARNERS]).dropna()
+    rows = evidence.robots[evidence.robots["movements"] == at]
+    logs = rows.assign(error=np.log(rows["error"])).pivot_table("error", "number", "learner")
+    table: pd.DataFrame = np.exp(logs.reindex(columns=[*LEARNERS]).dropna())
     if len(table) < 2:
         raise NotRun(f"random robots at {at}")
     return table
@@ -48,12 +50,6 @@ def share(which: pd.Series, *, level: Level = LEVEL) -> Interval:
         return Interval(float(which.mean()))
     between = stats.binomtest(int(which.sum()), len(which)).proportion_ci(level, "wilson")
     return Interval(float(which.mean()), between.low, between.high)
-
-
-def harmful(evidence: Evidence, name: str, at: int, *, level: Level = LEVEL) -> Interval:
-    """The share of robots on which a learner errs more than ``HARMFUL`` times as much as random movements."""
-    table = errors(evidence, at)
-    return share(table[name] > HARMFUL * table[RANDOM], level=level)
 
 
 def best(evidence: Evidence, name: str, at: int, *, level: Level = LEVEL) -> Interval:
@@ -81,13 +77,11 @@ def any_robot(evidence: Evidence) -> list[Claim]:
     def less(theirs: str) -> list[Part]:
         return [at_most(1, over, evidence, "practice", theirs, at, name=f"at {at}") for at in COUNTS]
 
-    seldom = [at_most(0.05, harmful, evidence, "practice", at, margin=0.1, name=f"at {at}") for at in COUNTS]
+    seldom = [at_most(0.05, clearly_harmed, evidence, at, margin=0.1, name=f"at {at}") for at in COUNTS]
     means = [at_most(bar, over, evidence, "practice", RANDOM, at, name=f"at {at}") for at, bar in MEANS.items()]
     listed = ", ".join(f"{bar:.2f}" for bar in MEANS.values())
     return [
-        Claim(
-            "`practice` harms on at most 0.05 of the robots at each number of movements, interval up to 0.15", seldom
-        ),
+        Claim("`practice` clearly harms on at most 0.05 of the robots at each count, interval up to 0.15", seldom),
         Claim(f"... errs in the mean at most {listed} times as much as random movements", means),
         Claim("... less than SAGG-RIAC at each: ratio ≤ 1", less("sagg-riac")),
         Claim("... than the standard baseline", less(BASELINE)),
@@ -108,69 +102,76 @@ def table(page: Page) -> str:
     return markdown(("mean, worst", *map(str, COUNTS)), rows)
 
 
-def repeated(evidence: Evidence, at: int) -> pd.DataFrame:
-    """`practice` and random movements, compared by robot over its seeds.
+def judged(evidence: Evidence, at: int) -> pd.DataFrame:
+    """`practice` and random movements, compared by robot over seeds.
 
-    Columns: ``ratio``, of their errors (geometric mean); ``harmed``, whether `practice` clearly errs more than
-    ``HARMFUL`` times as much, by Welch's one-sided test of log errors (p < .05); ``lives``, the share of seeds on which
-    it does; ``equal``, this share for two lives of random movements.
+    Columns: ``ratio``, of their errors on common seeds (geometric mean); ``harmed``, whether `practice` clearly errs
+    more than ``HARMFUL`` times as much; ``equal``, whether this is so of two halves of the lives of random movements.
 
     Raises:
-        NotRun: there is no robot with two seeds.
+        NotRun: there is no robot with lives enough.
     """
-    rows = evidence.repeated[evidence.repeated["movements"] == at]
-    table = np.log(rows.pivot(index=["number", "seed"], columns="learner", values="error").dropna())
-    robots = {}
-    for number, by_seed in table.groupby("number"):
-        ours, theirs, harm = by_seed["practice"].to_numpy(), by_seed[RANDOM].to_numpy(), np.log(HARMFUL)
-        if (n := len(ours)) > 1:
-            welch = stats.ttest_ind(ours, theirs + harm, equal_var=False, alternative="greater")
-            equal = (theirs[:, None] - theirs > harm).sum() / (n * (n - 1))
-            lives = (ours - theirs > harm).mean()
-            robots[number] = np.exp(ours.mean() - theirs.mean()), welch.pvalue < 0.05, lives, equal
+    rows, robots = evidence.robots[evidence.robots["movements"] == at], {}
+    for number, lives in rows[rows["learner"].isin(("practice", RANDOM))].groupby("number"):
+        logs = np.log(
+            lives.pivot(index="seed", columns="learner", values="error").reindex(columns=["practice", RANDOM])
+        )
+        both, random = logs.dropna(), logs[RANDOM].dropna().to_numpy()
+        ours, theirs = both["practice"].to_numpy(), both[RANDOM].to_numpy()
+        if len(ours) > 1 and (half := len(random) // 2) > 1:
+            ratio, equal = np.exp(ours.mean() - theirs.mean()), (random[half:], random[:half])
+            robots[number] = ratio, clearly_larger(ours, theirs), clearly_larger(*equal)
     if not robots:
-        raise NotRun(f"repeated lives on random robots at {at}")
-    return pd.DataFrame.from_dict(robots, orient="index", columns=["ratio", "harmed", "lives", "equal"])
+        raise NotRun(f"several lives on random robots at {at}")
+    return pd.DataFrame.from_dict(robots, orient="index", columns=["ratio", "harmed", "equal"])
+
+
+def clearly_larger(ours: Array, theirs: Array) -> bool:
+    """Whether our log errors are above theirs by more than ``HARMFUL``, by Welch's one-sided test (p < .05)."""
+    test = stats.ttest_ind(ours, theirs + np.log(HARMFUL), equal_var=False, alternative="greater")
+    return bool(test.pvalue < 0.05)
 
 
 def times_random(evidence: Evidence, at: int, *, level: Level = LEVEL) -> Interval:
     """The geometric mean over robots of the error of `practice` divided by that of random movements."""
-    return geometric_mean(repeated(evidence, at)["ratio"], level=level)
+    return geometric_mean(judged(evidence, at)["ratio"], level=level)
 
 
-def clearly_harmed(evidence: Evidence, at: int, *, level: Level = LEVEL) -> Interval:
-    """The share of robots on which `practice` clearly errs more than random movements."""
-    return share(repeated(evidence, at)["harmed"], level=level)
+def clearly_harmed(evidence: Evidence, at: int, column: str = "harmed", *, level: Level = LEVEL) -> Interval:
+    """The share of robots on which `practice` clearly errs more than random movements; "equal": two equal learners."""
+    return share(judged(evidence, at)[column], level=level)
 
 
 def fair(page: Page) -> str:
     """`practice` over random movements, both answered by `process`, five lives a robot."""
     try:
-        tables = [repeated(page.evidence, at) for at in COUNTS]
+        worst = [judged(page.evidence, at)["ratio"].max() for at in COUNTS]
     except NotRun as missing:
         page.missing.append(str(missing))
         return "Not run."
+
+    def row(statistic: Statistic, *of: object, form: str) -> list[str]:
+        return [page.cell(statistic, page.evidence, at, *of, form=form, between=True) for at in COUNTS]
+
     rows = [
-        [
-            "geometric mean [95 %]",
-            *(page.cell(times_random, page.evidence, at, form=".2f", between=True) for at in COUNTS),
-        ],
-        ["worst robot", *(f"{table['ratio'].max():.2f}" for table in tables)],
-        *(
-            [head, *(f"{table[column].mean():.0%}" for table in tables)]
-            for head, column in (
-                ("**clearly harmed robots**", "harmed"),
-                ("lives with a larger error", "lives"),
-                ("... of two equal learners", "equal"),
-            )
-        ),
+        ["geometric mean [95 %]", *row(times_random, form=".2f")],
+        ["worst robot", *(f"{ratio:.2f}" for ratio in worst)],
+        ["**clearly harmed robots**", *row(clearly_harmed, form=".0%")],
+        ["... by one of two equal learners", *row(clearly_harmed, "equal", form=".0%")],
     ]
     return markdown(("over random movements", *map(str, COUNTS)), rows)
 
 
+def lived(evidence: Evidence) -> str:
+    """The numbers of the random robots: ``500 to 559``."""
+    numbers = np.unique(evidence.robots["number"])
+    parts = np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1) if len(numbers) else []
+    return " and ".join(f"{part[0]} to {part[-1]}" for part in parts) or MISSING_CELL
+
+
 def alarms(page: Page) -> str:
     """How many lives on random robots, which do not change, noticed a change: ``2 of 240``."""
-    rows = page.evidence.random
+    rows = page.evidence.robots.dropna(subset="noticed")
     last = rows[(rows["movements"] == COUNTS[-1]) & (~rows["learner"].isin((BASELINE, RANDOM)))]
     return f"{(last['noticed'] > 0).sum()} of {len(last)}"
 

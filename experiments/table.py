@@ -3,6 +3,8 @@
     table = read_table(Path("results")); table[table.variant == "sgim-d"]
     merge(Path("results"), "results.csv", result_rows(config, run))
 A row that is made again from the same run is equal, byte for byte. explored.csv and asked.csv have further numbers.
+Most tables tell by which learning a row was made, see `LEARNING`. The first new row of a variant or learner removes its
+rows of other learning.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ import pandas as pd
 
 from sgimd_torch.asking.teachers import middle
 from sgimd_torch.evaluation import Benchmark
-from sgimd_torch.files import make_folder, write_text
+from sgimd_torch.files import checksum, make_folder, write_text
 from sgimd_torch.options.build import task_of
 from sgimd_torch.options.config import OWN, Config
 from sgimd_torch.runs.read import Run
@@ -26,30 +28,31 @@ from sgimd_torch.runs.tasks.taught import demonstrations_of
 from sgimd_torch.spaces import Array
 
 Row = dict[str, Any]
+REFERENCE: Final = Path(__file__).parents[1] / "tests" / "learner" / "reference.npz"
+LEARNING: Final = checksum(REFERENCE)
+"""Name of the learning of this library: checksum of the numbers that tests/learner/test_reference.py compares."""
 FILE: Final = "results.csv"
 ALIKE: Final = "process"  # inverse model that answers for every learner
 _RATIO: Final = ("ratio", "low", "high")
 _ASKED: Final = ("requests", "shown", "late", "late_own", "strong", "weak")
 # Of each table: the number of columns that form its key, and all columns, the key first. Keys of rows are unique.
 TABLES: Final[dict[str, tuple[int, tuple[str, ...]]]] = {
-    FILE: (4, ("variant", "seed", "movements", "answer", "task", "error", "floor")),
-    "explored.csv": (2, ("variant", "seed", "tiles", "goals", "near")),
-    "asked.csv": (3, ("variant", "seed", "teacher", *_ASKED)),
-    "rivals.csv": (4, ("rival", "setting", "seed", "movements", "linear", "process")),
-    "repeated.csv": (4, ("number", "learner", "seed", "movements", "error")),
-    "random.csv": (3, ("number", "learner", "movements", "error", "noticed")),
+    FILE: (4, ("variant", "seed", "movements", "answer", "task", "error", "floor", "learning")),
+    "explored.csv": (2, ("variant", "seed", "tiles", "goals", "near", "learning")),
+    "asked.csv": (3, ("variant", "seed", "teacher", *_ASKED, "learning")),
+    "robots.csv": (4, ("number", "learner", "seed", "movements", "error", "noticed", "learning")),
     "model_files.csv": (3, ("file", "outcome", "options", "version", "told", "words", "practice", "random", *_RATIO)),
     "refinement.csv": (
         3,
         ("robot", "seed", "search", "movements", "seconds", "error", "movements_then", "seconds_then", "error_then"),
     ),
-    "changes.csv": (5, ("robot", "change", "learner", "seed", "movements", "error", "noticed")),
+    "changes.csv": (5, ("robot", "change", "learner", "seed", "movements", "error", "noticed", "learning")),
 }
 TYPES: Final = {  # types of columns; all other columns have floats, and an empty field is NaN
-    **dict.fromkeys(("number", "seed", "movements", "movements_then", "tiles", "noticed", *_ASKED), "int64"),
-    **dict.fromkeys(("variant", "task", "answer", "teacher", "rival", "setting", "learner"), "str"),
+    **dict.fromkeys(("number", "seed", "movements", "movements_then", "tiles", *_ASKED), "int64"),
+    **dict.fromkeys(("variant", "task", "answer", "teacher", "learner", "learning"), "str"),
     **dict.fromkeys(("robot", "change", "search", "file", "outcome", "options", "version", "told", "words"), "str"),
-    **dict.fromkeys(("goals", "near"), "Int64"),  # with empty fields
+    **dict.fromkeys(("goals", "near", "noticed"), "Int64"),  # with empty fields
 }
 LATE: Final = 1000  # number of movements after which requests count as late: the learner should know whom to ask
 CORNER: Final = -1.0  # m, least x and y of the tiles of the rod's benchmark
@@ -91,6 +94,9 @@ def read_table(folder: Path, name: str = FILE) -> pd.DataFrame:
 def merge(folder: Path, name: str, rows: Sequence[Row]) -> None:
     """Add rows to a table in the order of their keys; a new row replaces an old row with the same key.
 
+    In a table with the column ``learning``, new rows have `LEARNING`, and replace the rows of other learning that have
+    the same variant or learner.
+
     Raises:
         ResultsError: see ``read_table``.
         OSError: the table cannot be written and stays unchanged.
@@ -101,7 +107,12 @@ def merge(folder: Path, name: str, rows: Sequence[Row]) -> None:
         fcntl.flock(held, fcntl.LOCK_EX)  # waits until no other process changes a table of this folder
         table = read_table(folder, name)
         if rows:
-            table = pd.concat([table, pd.DataFrame(rows, columns=[*columns]).astype(table.dtypes.to_dict())])
+            new = pd.DataFrame(rows, columns=[*columns])
+            if "learning" in columns:
+                group = "variant" if "variant" in columns else "learner"
+                table = table[(table["learning"] == LEARNING) | ~table[group].isin(new[group])]
+                new["learning"] = LEARNING
+            table = pd.concat([table, new.astype(table.dtypes.to_dict())])
         key = [*columns[:n_key]]
         write_table(folder, name, table.drop_duplicates(key, keep="last").sort_values(key))
 

@@ -27,6 +27,8 @@ OF_TEACHING: Final = ("demonstrations", "teacher", "teachers", "social")  # opti
 LEAST: Final = {"seed": 0, "movements": 1, "repeats": 0, "failures": 1, "at_once": 1, "evaluate_at": 1, "floor_at": 1}
 """Least value of an option, or of each of its numbers."""
 MOST_MOVEMENTS: Final = 10**8
+START: Final = "import sys; from sgimd_torch.__main__ import main; sys.exit(main())"
+"""Program for ``python -c`` that does what ``sgimd`` does."""
 
 
 @dataclass(frozen=True)
@@ -211,6 +213,11 @@ class Config:
     def title(self) -> str:
         """Name of the run in messages."""
         return f"{self.variant} seed {self.seed}"
+
+    @property
+    def program(self) -> tuple[str, ...]:
+        """Program for ``python -c``, and its arguments, that start or resume the run."""
+        return START, "run", "--resume", *words(self)
 
     @property
     def evaluations(self) -> list[int]:

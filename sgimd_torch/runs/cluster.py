@@ -18,8 +18,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Final
 
-from sgimd_torch.options.config import Config, words
-from sgimd_torch.runs.parallel import PATIENCE, POLL, Machine, log_of, start_process
+from sgimd_torch.runs.parallel import PATIENCE, POLL, Job, Machine, log_of, start_process
 from sgimd_torch.runs.read import movements_on_disk
 from sgimd_torch.runs.signals import Failed, say
 
@@ -30,12 +29,11 @@ except ImportError as error:
     raise ImportError(f"--on needs distributed: pip install 'sgimd-torch[cluster]' ({error})") from error
 
 CONNECT: Final = "5s"  # time for the scheduler to answer
-# Python's program for a run that ends at once when the worker that holds its stdin does.
+# Beginning of the program of a job that ends at once when the worker that holds its stdin does.
 HELD: Final = """
-import os, sys, threading
+import os, threading
 threading.Thread(target=lambda: os.read(0, 1) or os._exit(1), daemon=True).start()
-from sgimd_torch.__main__ import main
-sys.exit(main())"""
+"""
 LEAVING: Final = (Status.closing, Status.closed)  # a worker that does so can wait for a run only for a moment
 TERMINATED: Final = (-signal.SIGTERM, 128 + signal.SIGTERM)  # exit codes of a run that was told to stop
 UNDER_WAY: Final = set[str]()  # keys of the tasks whose runs have a process on this worker
@@ -65,8 +63,8 @@ class Cluster:
             raise ValueError(f"no Dask scheduler answers at {place}; `dask scheduler` starts one ({error})") from error
         say(f"{place} has {len(self.client.nthreads())} workers; more may join")
 
-    def start(self, config: Config) -> Task:
-        return Task(self.client, config)
+    def start(self, job: Job) -> Task:
+        return Task(self.client, job)
 
     def stop(self, runs: Sequence[Task]) -> None:
         keys, deadline = {run.future.key for run in runs}, time.monotonic() + PATIENCE
@@ -81,13 +79,13 @@ class Cluster:
 class Task:
     """A run that the cluster was given."""
 
-    def __init__(self, client: Client, config: Config) -> None:
-        self.config, self.returncode, log = config, 0, os.path.abspath(log_of(config))
-        self._submit = partial(client.submit, carry_out, words(config), log, os.getcwd(), pure=False)
+    def __init__(self, client: Client, job: Job) -> None:
+        self.job, self.returncode, log = job, 0, os.path.abspath(log_of(job))
+        self._submit = partial(client.submit, carry_out, job.program, log, os.getcwd(), pure=False)
         self._hand_over()
 
     def _hand_over(self) -> None:
-        self._movements, self.future = movements_on_disk(self.config.directory), self._submit()
+        self._movements, self.future = movements_on_disk(self.job.directory), self._submit()
 
     def poll(self) -> int | None:
         """The exit code of the run, or None.
@@ -102,7 +100,7 @@ class Task:
         except CancelledError as error:
             raise Failed("the scheduler is gone; all runs are kept, and the same command continues them") from error
         except KilledWorker:  # several workers have died during this run
-            if movements_on_disk(self.config.directory) > self._movements:
+            if movements_on_disk(self.job.directory) > self._movements:
                 self._hand_over()
                 return None
             self.returncode = -signal.SIGKILL
@@ -111,15 +109,15 @@ class Task:
         return self.returncode
 
 
-def carry_out(options: Sequence[str], log: str, folder: str) -> int:
-    """Make a run on a worker, by these options of ``sgimd run`` in this folder, and return its exit code.
+def carry_out(program: Sequence[str], log: str, folder: str) -> int:
+    """Do the work of a job on a worker, by its ``program`` in this folder, and return its exit code.
 
     Raises:
         Reschedule: the run was stopped, but not by the sweep: another worker continues it.
     """
     worker = get_worker()
     task = worker.state.tasks[worker.get_current_task()]
-    process = start_process(["-c", HELD], options, Path(log), stdin=subprocess.PIPE, folder=folder)
+    process = start_process([HELD + program[0], *program[1:]], Path(log), stdin=subprocess.PIPE, folder=folder)
     UNDER_WAY.add(task.key)
     while process.poll() is None and task.state != "cancelled" and worker.status not in LEAVING:
         time.sleep(POLL)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from compare import KEY, collect, compared, last_rows, main, runs_of
+from compare import collect, compared, jobs_of, last_rows, made_rows, main
 from made_up import row
 from runs import ROOT, start
 from sgimd_torch import run, sgim_d_letter
@@ -20,7 +20,7 @@ from sgimd_torch.record import RunError
 from sgimd_torch.runs.parallel import Machine, sweep
 from sgimd_torch.runs.read import Run, read_run
 from sgimd_torch.runs.signals import command
-from table import CORNER, explored_rows, merge, read_table, result_rows, task_name, tiles_reached
+from table import CORNER, LEARNING, explored_rows, merge, read_table, result_rows, task_name, tiles_reached
 from variants import EXPERIMENTS, MADE, VARIANTS, make_subsets
 
 # Two variants that live for 40 movements, and one, of an experiment of its own, whose demonstrations are missing.
@@ -39,6 +39,8 @@ variants.EXPERIMENTS["large"] = {"sgim-d-large": large}
 variants.EXPERIMENTS["broken"] = {"untaught": dict(algorithm="sgim-d", demonstrations=Path("nowhere.npz"), **tiny)}
 arm = dict(environment="planar-arm-7", movements=40, evaluate_at=(20,))
 variants.EXPERIMENTS["model"] = {"sgim-d.planar-arm-7": dict(algorithm="sgim-d", **arm)}
+import random_robots
+random_robots.COUNTS = (10,)
 import compare
 sys.exit(command(compare.main))
 """.replace("EXPERIMENTS", str(ROOT / "experiments"), 1)
@@ -73,19 +75,20 @@ def test_each_evaluation_is_a_row_the_failed_are_reported_and_a_second_start_doe
         assert [*zip(theirs.task, theirs.movements, theirs.answer, strict=True)] == [
             (task, when, "process") for when in (20, 40)
         ]
-        run = read_run(tmp_path / "runs" / variant / "seed-000")
+        run = read_run(tmp_path / "runs" / LEARNING / variant / "seed-000")
         assert [*theirs.error] == run.evaluations["own"]["mean_error"].tolist()
         assert theirs.floor.isna().all()  # the noise floor is measured only where a variant says so
     explored = read_table(tmp_path / "results", "explored.csv").set_index("variant")
     assert explored.goals["random"] == 0
     assert 0 < explored.tiles["random"] <= 40
-    n_goals = len(read_run(tmp_path / "runs/sgim-d-large/seed-000").chosen_goals())
+    n_goals = len(read_run(tmp_path / "runs" / LEARNING / "sgim-d-large/seed-000").chosen_goals())
     assert (explored.goals["sgim-d-large"], explored.near["sgim-d-large"]) == (n_goals, 0)  # of 40000 m², 7 are near
 
     contents = [path.read_bytes() for path in tmp_path.glob("results/*.csv")]
     code, _, errors = ended(compare("paper", "large"))
     assert code == 0
-    assert "2 runs, 2 of them in" in errors
+    assert "paper: 1 of 1 runs made, 0.0 of 0.0 processor hours left" in errors
+    assert "0 runs, 0.0 processor hours left" in errors
     assert "nothing is left to run: --verify 10 makes ten of these rows again" in errors
     assert [path.read_bytes() for path in tmp_path.glob("results/*.csv")] == contents
 
@@ -99,8 +102,7 @@ def test_a_run_that_lost_its_rows_is_collected_again_and_no_goal_is_counted_twic
     paths = [tmp_path / "results.csv", tmp_path / "explored.csv"]
 
     def collected():
-        known = {*read_table(tmp_path)[KEY].itertuples(index=False, name=None)}
-        before = last_rows(config) <= known
+        before = last_rows(config) <= made_rows(tmp_path)
         collect(config, tmp_path)
         return before
 
@@ -132,7 +134,7 @@ def test_a_run_that_ended_without_its_last_evaluation_is_no_result(go, benchmark
         (["--seeds", ""], "--seeds: must be like 5, 0-19 or 0,3,7-9, got ''"),
         (["--seeds=-1"], "--seeds: must be like 5, 0-19 or 0,3,7-9, got '-1'"),
         (["--processes", "0"], "--processes: must be a whole number of at least 1, got '0'"),
-        (["--out", "file/runs"], "file/runs/demonstrations cannot be made: Not a directory"),
+        (["--out", "file/runs"], f"file/runs/{LEARNING}/demonstrations cannot be made: Not a directory"),
         (["--results", "file"], "file cannot be made: File exists; is a file in its place?"),
         (["--results", "foreign"], "foreign/results.csv.*must begin with variant,seed"),
     ],
@@ -152,7 +154,7 @@ def test_impossible_requests_are_refused_with_their_reason(tmp_path, monkeypatch
 
 
 def test_every_variant_is_a_valid_run_with_its_own_name(tmp_path):
-    wanted = runs_of(list(EXPERIMENTS), [], range(1), tmp_path)
+    wanted = [config for experiment in EXPERIMENTS for config in jobs_of(experiment, [], range(1), tmp_path)]
     assert len({config.variant for config in wanted}) == len(wanted)
     for config in wanted:
         assert parse(words(config))[0] == config
@@ -173,7 +175,11 @@ def test_a_task_is_the_robot_and_what_is_not_as_usual_about_it():
 
 
 def test_a_run_is_evaluated_by_its_own_inverse_and_by_the_one_that_answers_for_all(tmp_path):
-    wanted = {config.variant: config for config in runs_of(["letter", "suite", "paper"], [], range(1), tmp_path)}
+    wanted = {
+        config.variant: config
+        for experiment in ("letter", "suite", "paper")
+        for config in jobs_of(experiment, [], range(1), tmp_path)
+    }
     assert wanted["sgim-d-letter"].evaluated_by == ("own", "process")
     assert wanted["uniform-nearest.toss"].evaluated_by == ("own", "process")
     assert wanted["sgim-d"].evaluated_by == ("own",)
@@ -212,7 +218,7 @@ def test_the_letter_is_one_word_for_twelve_options():
 
 
 def test_rows_of_the_letter_are_the_algorithm_with_two_bounds(go, tmp_path):
-    (config,) = runs_of(["letter"], ["sgim-d-letter"], [3], tmp_path)
+    (config,) = jobs_of("letter", ["sgim-d-letter"], [3], tmp_path)
     assert (config.algorithm, dict(config.parts)) == ("sgim-d-letter", BOUNDS)
     options = ("--algorithm", "sgim-d-letter", "--global-range", "0.05,0.95", "--social.exact-first", "true")
     arm = ("--environment", "planar-arm-7", "--teacher.every", 20, "--movements", 60, "--evaluate-at", "[]")
@@ -281,7 +287,7 @@ def test_rows_are_drawn_by_lot_and_made_again_in_a_folder_of_their_own(tmp_path,
     assert code == 1
     assert sorted(line.split()[0] for line in said.out.splitlines()) == ["DIFFERS", "equal"]  # the second was made up
     assert "1 equal, 0 equal but for rounding" in said.err
-    assert {path.name for path in (tmp_path / "runs").iterdir()} == {"demonstrations", "verify-0"}
+    assert {path.name for path in (tmp_path / "runs" / LEARNING).iterdir()} == {"demonstrations", "verify-0"}
 
 
 def test_a_cluster_is_asked_for_as_by_a_sweep(tmp_path, monkeypatch, capsys):

@@ -27,7 +27,7 @@ def package(tmp_path, monkeypatch):
 
 
 def test_each_file_gets_a_row_once_and_one_that_is_right_is_learnt(package, monkeypatch):
-    call = [str(package), "--results", "results", "--processes", "1"]
+    call = [str(package), "--results", "results"]
     assert main(call) == 0
     table = read_table(package / "results", model_files.TABLE).set_index("file")
     assert table.told.to_dict() == {"toys/strong.xml": RIGHT, "toys/weak.xml": WARNED, "toys/broken.xml": REFUSED}

@@ -1,7 +1,7 @@
 """The pages of results: made of rows and templates alone, every row for a page, what is missing named."""
 
 import re
-from itertools import chain, count
+from itertools import count
 from pathlib import Path
 
 import pytest
@@ -10,12 +10,12 @@ import claims
 import refinement
 from claims import PAGES, README, TEMPLATES, filled, main
 from evidence import LAST, Evidence
-from made_up import write, write_rows
+from made_up import row, write, write_rows
+from page_tables import Page
 from refinement import TABLE
 from runs import ROOT
-from sgimd_torch.options.command_line import parse
 from sgimd_torch.runs.signals import command
-from table import read_table
+from table import LEARNING
 from variants import VARIANTS
 
 SHIPPED = ROOT / "results"
@@ -102,44 +102,23 @@ def test_a_readme_without_a_section_of_results_is_refused_and_no_page_made(tmp_p
     assert not Path("results").exists()
 
 
+def test_a_page_names_the_groups_whose_rows_are_not_all_of_this_learning(tmp_path):
+    write_rows(tmp_path)
+    rows = [row("random", seed, 5000, "process", 0.1, learning="older" if seed else LEARNING) for seed in range(4)]
+    rows.append(row("sgim-d-letter", 0, 5000, "process", 0.1, learning="older"))
+    page = Page(Evidence.of(write(tmp_path, rows)), tmp_path)
+    said = "**75 % of `paper`, 100 % of `letter`: made by an earlier version.**"
+    assert page.older("paper", "letter", "large", "robots") == said
+    assert page.older("letter") == "**All rows: made by an earlier version.**"
+    assert Page(Evidence.of(write(tmp_path, rows[:1])), tmp_path).older("paper") == ""
+
+
 def test_what_was_not_run_is_left_out_of_a_table_and_named(tmp_path):
     found = Evidence.of(write_rows(tmp_path, without=["practice-interest"]))
     text, page = filled("LEARNING", found, tmp_path)
     assert "| ... and a second family: `practice` | 0.0" in text
     assert "... but with goals by interest |" not in text
     assert "practice-interest at 1000" in page.missing
-
-
-@pytest.mark.parametrize("rival", read_table(SHIPPED, "rivals.csv").rival.unique())
-def test_each_setting_of_a_rival_is_an_option_of_a_run(rival):
-    """As the page of rivals says."""
-    table, once = read_table(SHIPPED, "rivals.csv"), rival.endswith("-once")
-    words = ["--algorithm", rival.removesuffix("-once").replace("-demonstrations", "-taught")]
-    words += ["--imitations", "1", "--teacher", "at-once"] if once else []
-    if rival == "random-goals-demonstrations":
-        words = ["--algorithm", "sgim-d", "--goals", "uniform", "--inverse", "nearest", "--search", "perturb"]
-    for setting in {*table.setting[table.rival == rival]} - {"default"}:
-        name, value = setting.split("=")
-        chosen = {f"--{'search.' * (name == 'sd' and '--search' in words)}{name}": value}
-        if rival.startswith("isoline"):
-            words[1], chosen = words[1].replace("isoline", "map-elites"), {"--sd": "0.02", "--line": "0.2", **chosen}
-        parse([*words, *chain(*chosen.items())])
-
-
-def test_the_page_of_rivals_has_the_default_and_the_best_setting(tmp_path):
-    rows = [
-        ("isoline", setting, seed, when, error, error + 0.01)
-        for setting, error in (("default", 0.06), ("sd=0.01", 0.05), ("sd=0.05", 0.07))
-        for seed in (1000, 1001)
-        for when in (1000, 5000)
-    ]
-    write_rows(tmp_path)
-    write(tmp_path, [*rows, ("isoline", "sd=0.01", 1002, 5000, 0.07, 0.08)], "rivals.csv")
-    text, _ = filled("RIVALS", Evidence.of(tmp_path), tmp_path)
-    assert [line for line in text.splitlines() if line.startswith("| `isoline`")] == [
-        "| `isoline` | `default` | 0.0700 | – |",
-        "| `isoline` | `sd=0.01` | 0.0600 | 0.0800 |",
-    ]
 
 
 def test_the_page_of_searches_has_errors_over_those_of_the_simplex_and_the_cost_of_each(tmp_path):
@@ -158,8 +137,8 @@ def test_the_page_of_searches_has_errors_over_those_of_the_simplex_and_the_cost_
 def test_searches_side_by_side_have_the_lives_that_each_has_alone(monkeypatch):
     monkeypatch.setattr(refinement, "WARM", 1)
     ticks = count()  # every movement takes as long, so equal time is equal movements
-    rows = refinement.trio(ROBOT, 3, movements=120, clock=lambda: next(ticks))
-    alone = refinement.Life({**refinement.ROBOTS[ROBOT], "search": "gradient", "seed": 3}, 120, lambda: 0)
+    rows = refinement.life(ROBOT, 3, movements=120, clock=lambda: next(ticks))
+    alone = refinement.TimedLife({**refinement.ROBOTS[ROBOT], "search": "gradient", "seed": 3}, 120, lambda: 0)
     for _ in range(120):
         alone.move()
     assert rows["gradient"] == (120, 120, alone.now()[2], 119, 119, rows["gradient"][-1])

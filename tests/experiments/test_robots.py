@@ -1,22 +1,26 @@
 """Robots that nobody tuned on, and robots that change: how they change, their statistics, their claims."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pandas as pd
 import pytest
 
+import random_robots
 import robots
 from changing import GRADUAL, UNDONE, Changing, errors
 from evidence import Evidence, NotRun
-from lives import make_lives
-from made_lives import ALIVE, life, write_lives
+from lives import Life, collect
+from made_lives import write_lives
 from model_files import File
 from page_tables import Page
-from random_robots import FAMILIES, LEARNERS, RandomRobot, kind
+from random_robots import COUNTS, FAMILIES, LEARNERS, RandomRobot, kind
+from runs import ROOT
 from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.environments.planar_arm import PlanarArm
-from table import merge, read_table
+from sgimd_torch.runs.parallel import Machine, sweep
+from table import LEARNING, read_table
 
 
 def moved(change, since, theta):
@@ -75,41 +79,49 @@ def test_shares_and_means_over_robots(tmp_path):
     found = found_in(tmp_path, lambda *key: {(0, "sagg-riac"): 0.25, (1, "sagg-riac"): 2.0}.get(key[:2], 1.0), robots=4)
     assert robots.best(found, "sagg-riac", 50).value == 0.25
     assert robots.best(found, "practice", 50).value == 0.75
-    assert robots.harmful(found, "sagg-riac", 50).value == 0.25
-    assert robots.over(found, "sagg-riac", "random", 50).value == pytest.approx((0.8**4 * 0.25 * 2) ** (1 / 4))
+    ratio = robots.over(found, "sagg-riac", "random", 50).value
+    assert ratio == pytest.approx((0.8**4 * 0.25 * 2) ** (1 / 4), rel=0.003)
 
 
 def test_no_harm_on_sixty_robots_does_not_exclude_harm_on_one_in_twenty(tmp_path):
     """Wilson's bound for 0 of n is z^2 / (n + z^2)."""
-    value, low, high = robots.harmful(found_in(tmp_path), "practice", 100)
+    value, low, high = robots.clearly_harmed(found_in(tmp_path), 100)
     assert (value, low, high) == pytest.approx((0, 0, 1.96**2 / (60 + 1.96**2)), abs=1e-5)
 
 
 def test_only_robots_that_every_learner_has_learnt_count(tmp_path):
     found = found_in(tmp_path, robots=5)
-    found = replace(found, random=found.random.query("number != 3 or learner != 'random'"))
+    found = replace(found, robots=found.robots.query("number != 3 or learner != 'random'"))
     assert [*robots.errors(found, 50).index] == [0, 1, 2, 4]
     assert {*robots.errors(found, 50).columns} == {*LEARNERS}
 
 
-def test_harm_is_judged_over_the_lives_of_a_robot(tmp_path):
+def test_harm_is_judged_over_the_lives_of_a_robot_and_beside_it_two_halves_of_the_random_lives(tmp_path):
     """A robot on which practice errs twice as much in each life is harmed; one with the same errors in another order is
-    not, though it errs more in half of its lives."""
-    random = [1.0, 1.1, 1.2, 1.3, 1.4]
-    practice = {460: [2 * error for error in random], 461: random[::-1]}
-    lives = [(n, name, seed, errors[seed]) for n, ours in practice.items() for seed in range(5)
-             for name, errors in (("practice", ours), ("random", random))]  # fmt: skip
-    rows = [(n, name, seed, 50, error) for n, name, seed, error in lives]
-    columns = ["number", "learner", "seed", "movements", "error"]
-    found = replace(found_in(tmp_path), repeated=pd.DataFrame(rows, columns=columns))
-    table = robots.repeated(found, 50)
+    not, though it errs more in half of its lives. On the latter the later random lives err three times as much."""
+    random = {500: [1.0, 1.1, 1.2, 1.3, 1.4] * 2, 501: [1.0, 1.1, 1.2, 1.3, 1.4, 3.0, 3.3, 3.6, 3.9, 4.2]}
+    practice = {500: [2 * error for error in random[500][:5]], 501: random[501][4::-1]}
+    lives = [(number, name, seed, 50, error) for name, errors in (("practice", practice), ("random", random))
+             for number, by_seed in errors.items() for seed, error in enumerate(by_seed)]  # fmt: skip
+    found = found_in(tmp_path, robots=2)
+    found = replace(found, robots=pd.DataFrame(lives, columns=["number", "learner", "seed", "movements", "error"]))
+    table = robots.judged(found, 50)
     assert table.ratio.tolist() == pytest.approx([2, 1])
     assert table.harmed.tolist() == [True, False]
-    assert table.lives.tolist() == [1, 0.4]
-    assert table["equal"].tolist() == [0.5, 0.5]
+    assert table["equal"].tolist() == [False, True]
     assert robots.clearly_harmed(found, 50, level=None).value == 0.5
     with pytest.raises(NotRun, match="at 100"):
-        robots.repeated(found, 100)
+        robots.judged(found, 100)
+
+
+def test_robots_are_named_by_their_numbers(tmp_path):
+    found = found_in(tmp_path, robots=3)
+    numbers = found.robots["number"]
+    assert robots.lived(found) == "0 to 2"
+    assert (
+        robots.lived(replace(found, robots=found.robots.assign(number=numbers + 3 * (numbers > 1))))
+        == "0 to 1 and 5 to 5"
+    )
 
 
 def test_the_learner_of_before_is_compared_with_the_one_that_starts_anew(tmp_path):
@@ -127,18 +139,16 @@ def test_model_files_are_counted_by_what_is_told_and_errors_on_them_compared(tmp
     assert "errs 0.80 times as much as random movements in the mean of 1, worse by its interval on 0." in said
 
 
-def test_lives_that_the_table_has_are_not_made_again_and_the_others_get_their_rows(tmp_path):
-    kept = {"number": 1, "learner": "practice", "movements": 2, "error": 9.0, "noticed": 5}
-    merge(tmp_path, "random.csv", [kept])
-    make_lives(tmp_path, "random.csv", life, ALIVE, processes=1)
-    rows = read_table(tmp_path, "random.csv").set_index(["number", "learner", "movements"])
-    assert rows.error.to_dict() == {
-        (0, "practice", 1): 0.5,
-        (0, "practice", 2): 0.25,
-        (0, "random", 1): 0.5,
-        (0, "random", 2): 0.25,
-        (1, "practice", 2): 9.0,
-        (1, "random", 1): 0.5,
-        (1, "random", 2): 1.25,
-    }
-    assert rows.noticed[1, "random", 2] == 1
+def test_a_life_is_a_job_that_leaves_the_rows_of_its_table(tmp_path, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    life = Life("robots.csv", (501, "random", 3), COUNTS[-1], tmp_path)
+    assert sweep([life], Machine(1), on_end=partial(collect, tmp_path)) == []
+    rows = read_table(tmp_path, "robots.csv").set_index(["number", "learner", "seed", "movements"])
+    assert [*rows.index] == [(501, "random", 3, at) for at in COUNTS]
+    assert rows.error[501, "random", 3, COUNTS[0]] == random_robots.life(501, "random", 3)[COUNTS[0]][0]
+    assert {*rows.learning} == {LEARNING}
+
+
+def test_a_life_that_fails_is_named(tmp_path):
+    (said,) = sweep([Life("robots.csv", (501, "nobody", 3), 10, tmp_path)], Machine(1))
+    assert said.startswith("501 nobody 3 failed: KeyError: 'nobody'")

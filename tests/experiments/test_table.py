@@ -7,7 +7,7 @@ import pytest
 from claims import main
 from made_up import row, write
 from sgimd_torch.runs.signals import command
-from table import FILE, TABLES, ResultsError, merge, read_table, write_table
+from table import FILE, LEARNING, TABLES, ResultsError, merge, read_table, write_table
 
 SHIPPED = Path(__file__).parents[2] / "results"
 
@@ -26,6 +26,17 @@ def test_a_row_made_again_takes_the_place_of_the_old_one_and_the_others_stay(tmp
     assert [*table.seed] == [0, 1]
     assert [*table.error] == [0.1 + 0.2, 0.5]
     assert table.floor.isna().all()
+
+
+def test_rows_of_other_learning_give_way_to_the_first_new_row_of_their_variant_and_of_no_other(tmp_path):
+    write(tmp_path, [row(name, seed, 20, "linear", 0.1, learning="older") for name in ("a", "b") for seed in (1, 2)])
+    merge(tmp_path, FILE, [row("a", 7, 20, "linear", 0.3)])
+    table = read_table(tmp_path)
+    assert [*zip(table.variant, table.seed, table.learning, strict=True)] == [
+        ("a", 7, LEARNING),
+        ("b", 1, "older"),
+        ("b", 2, "older"),
+    ]
 
 
 def test_without_a_file_a_table_is_empty_and_none_is_made(tmp_path):

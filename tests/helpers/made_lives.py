@@ -1,14 +1,10 @@
-"""Lives for processes of their own, which import this module, and made-up rows of tables on robots."""
+"""Made-up rows of tables on robots."""
+
+from itertools import product
 
 import numpy as np
 
 from table import TABLES, merge
-
-ALIVE = {(k, name): 2 for k in range(2) for name in ("practice", "random")}  # movements by key
-
-
-def life(number, learner):
-    return {1: (0.5, 0), 2: (0.25 + number, number)}
 
 
 def write_lives(folder, factor=lambda *key: 1.0, robots=60, seeds=8):
@@ -17,15 +13,15 @@ def write_lives(folder, factor=lambda *key: 1.0, robots=60, seeds=8):
     Two model files: `practice` errs .8 times as much as random movements on one, the other is refused.
     """
     from changing import AFTER, ARM, BEGUN, CHANGES, ROBOTS, SIMULATOR, after, learners
-    from random_robots import COUNTS, LEARNERS, RANDOM
+    from random_robots import COUNTS, LEARNERS, RANDOM, SEEDS, TABLE
 
     rows = []
     for number in range(robots):
         for name in LEARNERS:
-            for at in COUNTS:
-                error = {"practice": 0.3, RANDOM: 1.0}.get(name, 0.8) * (1 + 0.002 * number)
-                rows.append((number, name, at, error * factor(number, name, at), 0))
-    merge(folder, "random.csv", [dict(zip(TABLES["random.csv"][1], row, strict=True)) for row in rows])
+            for seed, at in product(SEEDS[name], COUNTS):
+                error = {"practice": 0.3, RANDOM: 1.0}.get(name, 0.8) * (1 + 0.002 * number) * (1 + 0.001 * (seed % 5))
+                rows.append((number, name, seed, at, error * factor(number, name, at), 0))
+    merge(folder, TABLE, [dict(zip(TABLES[TABLE][1], row, strict=False)) for row in rows])
     rows, goes_on = [], {**dict.fromkeys(AFTER, 0.4), 50: 0.4}
     places = [(robot, change, after(robot)) for robot in ROBOTS for change in CHANGES]
     for robot, change, times in [*places, (ARM, SIMULATOR, BEGUN)]:
@@ -34,7 +30,7 @@ def write_lives(folder, factor=lambda *key: 1.0, robots=60, seeds=8):
                 for seed in range(seeds):
                     error = {"goes-on": goes_on[at], "wrong": 0.9}.get(learner, 1.0) * np.exp(0.01 * (seed % 3))
                     rows.append((robot, change, learner, seed, at, error * factor(robot, change, learner, at), 0))
-    merge(folder, "changes.csv", [dict(zip(TABLES["changes.csv"][1], row, strict=True)) for row in rows])
+    merge(folder, "changes.csv", [dict(zip(TABLES["changes.csv"][1], row, strict=False)) for row in rows])
     rows = [
         ("dm_control/arm.xml", "site:tip", "", "1.0", "right", "", 0.4, 0.5, 0.8, 0.7, 0.9),
         ("robosuite/arm.xml", "geom:x", "", "1.5", "refused", "no", *[None] * 5),

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 
 from claimed import SUITE, TIMES
-from table import FILE, TABLES, write_table
+from table import FILE, LEARNING, TABLES, write_table
 from variants import ARMS, EXPERIMENTS, FOUR, SPARSE
 
 MOVEMENTS = (*TIMES, 5000)
@@ -84,17 +84,18 @@ def error(name, seed, movements, last=None):
     return (ERRORS[name] if last is None else last) * spread(name, seed) * (0.8 + 0.2 * 5000 / movements)
 
 
-def row(variant, seed, movements, answer, error, floor=None, task="fishing-rod"):
+def row(variant, seed, movements, answer, error, floor=None, task="fishing-rod", learning=LEARNING):
     """A row of results.csv."""
-    values = (variant, seed, movements, answer, task, error, floor)
+    values = (variant, seed, movements, answer, task, error, floor, learning)
     return dict(zip(TABLES[FILE][1], values, strict=True))
 
 
 def write(folder, rows, name=FILE):
-    """Write a table of these rows, and return its folder."""
+    """Write a table of these rows, which may lack the last column, and return its folder."""
     folder.mkdir(parents=True, exist_ok=True)
     columns = TABLES[name][1]
-    write_table(folder, name, pd.DataFrame([*rows], columns=[*columns]))
+    rows = [row if len(row) == len(columns) else (*row, LEARNING) for row in rows]
+    write_table(folder, name, pd.DataFrame(rows, columns=[*columns]))
     return folder
 
 
