@@ -52,7 +52,7 @@ def learning(evidence: Evidence) -> Figure:
     """Error against movements on the rod."""
     figure = Figure(figsize=(8, 4.4), layout="constrained")
     ax = figure.subplots()
-    names = ("random", "sagg-riac", "sgim-d", "practice", "practice-middle", "practice-taught")
+    names = ("random", "sagg-riac", "sgim-d", "practice", "practice-wide", "practice-taught")
     curves(ax, evidence, {name: name for name in names})
     return figure
 

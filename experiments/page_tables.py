@@ -24,7 +24,7 @@ MISSING_CELL: Final = "–"
 # Three variants of each rival: without a teacher, with a demonstration every 30 movements, with all at the start.
 RIVALS: Final[Mapping[str, tuple[str, str, str]]] = {
     "practice": ("practice", "practice-taught-every-30", "practice-taught"),
-    "practice, from the middle only": ("practice-middle", "", ""),
+    "practice, first movements uniform": ("practice-wide", "", ""),
     "SAGG-RIAC; SGIM-D": ("sagg-riac", "sgim-d", "sgim-d-once"),
     "the standard baseline": (UNIFORM, "uniform-nearest-taught", "uniform-nearest-taught-once"),
     "CMA-MAE": ("cma-mae", "cma-mae-taught", "cma-mae-taught-once"),
@@ -43,9 +43,8 @@ GAIN: Final[Mapping[str, str]] = {
     "the standard baseline": UNIFORM,
     "... begun in the middle": "middle",
     "... with `process`": "middle-process",
-    "... and goals within reach": "practice-middle",
-    "... begun with uniform movements": "practice-wide",
-    "... and a second family: `practice`": "practice",
+    "... and goals within reach: `practice`": "practice",
+    "... but first movements uniform": "practice-wide",
     "... but with goals by interest": "practice-interest",
 }
 
@@ -159,7 +158,7 @@ class Page:
 
     def suite(self, at: int = 1000) -> str:
         """Errors divided by the error of random movements: on each task, and as interquartile mean over tasks."""
-        learners = ("practice", "practice-middle", UNIFORM, "map-elites")
+        learners = ("practice", UNIFORM, "map-elites")
         known = {name: [task for task in TASKS if on(name, task) in VARIANTS] for name in learners}
         rows = [
             [titled(task), *(self._over_tasks(name, [task], at) if task in known[name] else "–" for name in learners)]

@@ -33,7 +33,6 @@ from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.learner import Learner
 from sgimd_torch.parts import Inverse
-from sgimd_torch.searches.explore import Returning
 from sgimd_torch.searches.perturb import Perturb
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Array, Box
@@ -47,7 +46,6 @@ RANDOM: Final = "random"  # reference: random movements
 BASELINE: Final = "uniform-nearest"  # reference: the standard baseline
 LEARNERS: Final[Mapping[str, Callable[[RandomRobot, int], Learner]]] = {
     "practice": practice,
-    "practice-middle": partial(practice, explore=partial(Returning, uniform=0.0)),
     "practice-interest": partial(practice, goals=InterestMap),
     "sagg-riac": sagg_riac,
     BASELINE: partial(sagg_riac, goals=UniformGoals, inverse=NearestNeighbour, search=Perturb, budget=1),

@@ -86,7 +86,6 @@ def any_robot(evidence: Evidence) -> list[Claim]:
         Claim("... less than SAGG-RIAC at each: ratio ≤ 1", less("sagg-riac")),
         Claim("... than the standard baseline", less(BASELINE)),
         Claim("... than with goals by interest", less("practice-interest")),
-        Claim("... than if all movements spread from the middle of Π", less("practice-middle")),
     ]
 
 

@@ -12,7 +12,7 @@ _DRAWN: Final = {
     "sagg-riac": ("SAGG-RIAC", "#0072b2"),
     "sagg-riac-letter": ("SAGG-RIAC, to the letter", "#117733"),
     "practice": ("Practice", "#332288"),
-    "practice-middle": ("From the middle only", "#ddcc77"),
+    "practice-wide": ("Practice, begun uniformly", "#ddcc77"),
     "practice-interest": ("Practice, by interest", "#88ccee"),
     "practice-taught": ("Practice, taught", "#aa4499"),
     "observation": ("Observation", "#cc79a7"),

@@ -106,7 +106,6 @@ ROBOTS = {
     ("any_robot", 2): lambda number, *key: 0.3 if key == ("sagg-riac", 50) else 1,
     ("any_robot", 3): lambda number, *key: 0.3 if key == ("uniform-nearest", 50) else 1,
     ("any_robot", 4): lambda number, *key: 0.3 if key == ("practice-interest", 50) else 1,
-    ("any_robot", 5): lambda number, *key: 0.3 if key == ("practice-middle", 50) else 1,
     ("changes", 0): lambda *key: 1.5 if key == ("fishing-rod", "undone", "goes-on", 250) else 1,
     ("changes", 1): lambda *key: 3 if key == ("toss", "gradual", "goes-on", 500) else 1,
     ("changes", 2): lambda *key: 3 if key == ("crawler", "stuck", "goes-on", 1000) else 1,

@@ -44,7 +44,7 @@ ERRORS = {  # errors (m) after 5000 movements by name, as in `Evidence`
     **{f"{name}-once": 0.3 for name in ("cma-mae-taught", "map-elites-taught", "uniform-nearest-taught", "sgim-d")},
     "practice-taught-every-30": 0.03,
     **dict.fromkeys(("practice-taught", "practice-corner"), 0.02),
-    **dict.fromkeys(("practice", "practice-wide", "practice-middle"), 0.022),
+    **dict.fromkeys(("practice", "practice-wide"), 0.022),
     "practice-interest": 0.021,
     "cma-mae": 0.04,
     "map-elites": 0.05,
