@@ -204,7 +204,7 @@ def test_a_teacher_who_mislabels_is_soon_left_alone():
 
 
 def test_of_two_teachers_each_is_asked_about_goals_of_their_own_half():
-    own = [(request.goal[0] < 0) == (request.teacher == "low") for request in late_requests(1500, 800)]
+    own = [(request.goal[0] < 0) == (request.teacher == "low") for request in late_requests(1000, 600)]
     assert np.mean(own) > 0.8
 
 

@@ -1,6 +1,6 @@
 """A robot that changes: it is noticed, told and repeated; earlier exemplars are kept if they help now."""
 
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -63,7 +63,7 @@ def test_where_nothing_changes_a_life_is_that_of_a_learner_who_notices_nothing(n
     taught = name == "sgim-d"
     teachers = [PeriodicTeacher(demonstrations(ARM), stream(0, "teacher")) if taught else None for _ in range(2)]
     thetas = [
-        live(watches(LIVES[name](arm, 1)), Changing(arm, "none", 0), 260, teacher=teacher)
+        live(watches(LIVES[name](arm, 1)), Changing(arm, "none", 0), 160, teacher=teacher)
         for watches, teacher in zip((blind, lambda learner: learner), teachers, strict=True)
     ]
     assert np.array_equal(*thetas, equal_nan=True)
@@ -85,10 +85,10 @@ def test_after_a_small_change_a_learner_is_far_better_than_one_that_begins_and_o
     for seed in (3, 13, 23):
         makes = (practice, lambda *to: blind(practice(*to)), practice)
         errors.append([])
-        for make, before in zip(makes, (400, 400, 0), strict=True):
+        for make, before in zip(makes, (200, 200, 0), strict=True):
             robot = Changing(PlanarArm(7), "offset-0.05", before)
             learner = make(robot, seed)
-            live(learner, robot, before + 100)
+            live(learner, robot, before + 60)
             errors[-1].append(error(learner, robot))
     notices, deaf, anew = np.exp(np.log(errors).mean(axis=0))
     assert notices < 0.6 * min(deaf, anew)
@@ -139,19 +139,19 @@ def test_competence_falls_again_where_nothing_is_reached_any_more(name):
 @pytest.mark.parametrize("at_once", [1, 5])
 @pytest.mark.parametrize("name", LIVES)
 def test_a_life_through_a_change_is_repeated_exactly(name, at_once, tmp_path):
-    robot, saved = Changing(ARM, "offset-0.1", 150), tmp_path / "life.sqlite"
+    robot, saved = Changing(ARM, "offset-0.1", 80), tmp_path / "life.sqlite"
     whole = LIVES[name](robot, 2)
     shown = demonstrations(ARM)
     teacher = PeriodicTeacher(shown, stream(0, "teacher")) if name == "sgim-d" else None
-    live(whole, robot, 240, at_once, teacher=teacher)
+    live(whole, robot, 140, at_once, teacher=teacher)
     assert whole.changes
     save_life(whole, saved)
     again = LIVES[name](robot, 2)
     teacher_again = PeriodicTeacher(shown, stream(0, "teacher")) if name == "sgim-d" else None
     load_life(again, saved, teacher=teacher_again)
     assert again.changes == whole.changes
-    first = live(whole, robot, 270, at_once, teacher=teacher)
-    assert np.array_equal(first, live(again, robot, 270, at_once, teacher=teacher_again), equal_nan=True)
+    first = live(whole, robot, 160, at_once, teacher=teacher)
+    assert np.array_equal(first, live(again, robot, 160, at_once, teacher=teacher_again), equal_nan=True)
 
 
 def test_movements_of_another_program_and_failures_count_and_a_change_among_them_is_noticed():
@@ -177,18 +177,25 @@ def test_a_demonstration_after_a_change_is_imitated(changed):
     assert np.array_equal(learner.ask(NO_CONTEXT).theta, lesson.trajectory[-1])
 
 
+@cache
+def error_alone(seed):
+    """Error of practice after 60 movements without a simulator."""
+    learner = practice(ARM, seed)
+    live(learner, Changing(ARM, "none", 0), 60)
+    return error(learner, ARM)
+
+
 @pytest.mark.parametrize("change", ["none", "offset-0.05", "mirrored"])
 def test_a_simulator_helps_as_far_as_it_is_right(change):
     there, ratios = Changing(ARM, change, 0), []
     for seed in (5, 15, 25):
         simulated = practice(there, seed)
-        live(simulated, there, 300)
-        helped, alone = practice(ARM, seed + 1, prior=simulated.memory), practice(ARM, seed + 1)
-        for learner in (helped, alone):
-            live(learner, Changing(ARM, "none", 0), 60)
+        live(simulated, there, 150)
+        helped = practice(ARM, seed + 1, prior=simulated.memory)
+        live(helped, Changing(ARM, "none", 0), 60)
         assert helped.begun == 0
         assert len(helped.memory) == 60
-        ratios.append(error(helped, ARM) / error(alone, ARM))
+        ratios.append(error(helped, ARM) / error_alone(seed + 1))
     assert np.exp(np.log(ratios).mean()) < (1.03 if change == "mirrored" else 0.5)
 
 

@@ -26,6 +26,7 @@ from own import MODULE
 from sgimd_torch.__main__ import _call
 from sgimd_torch.options.catalogue import WORDS
 from sgimd_torch.options.command_line import parse
+from sgimd_torch.runs import tasks
 from sgimd_torch.runs.signals import command
 
 ROOT = Path(__file__).parents[2]
@@ -45,6 +46,8 @@ PAGES = [
 ]
 # How-to pages are read one after the other in one folder; here with less to do: seconds, not minutes.
 SMALLER = {
+    "--movements 300 --name reach": "--movements 40 --repeats 0 --name reach",
+    "--goals 0.5,0.5 0.7,0.2": "--goals 0.5,0.5",
     "--movements 500": "--movements 60 --repeats 0",
     "--movements 800": "--movements 80",
     "--movements 1000": "--movements 300",
@@ -107,6 +110,7 @@ def folder(tmp_path, monkeypatch):
     before = set(sys.modules)
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(tasks, "MAX_GOALS", 40)
     yield tmp_path
     for name in set(sys.modules) - before:
         if (getattr(sys.modules[name], "__file__", None) or "").startswith(str(tmp_path)):

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from runs import content_of
+from sgimd_torch import session
 from sgimd_torch.record import Record
 from sgimd_torch.runs.at_once import in_processes
 from sgimd_torch.runs.directory import RUN_FILE
@@ -90,24 +91,29 @@ UNJUDGED = ["--evaluate-at", "[]", "--benchmark", "null"]
 RUN = ["--algorithm", "practice", "--at-once", "4", "--environment"]
 
 
-@pytest.mark.parametrize("robot", ["planar-arm-7", "experiments.toys:toss", "robots_at_once:Odd"])
-def test_a_run_that_was_stopped_goes_on_to_the_rows_of_a_whole_one(go, own, tmp_path, robot, capfd):
+@pytest.mark.parametrize(
+    ("robot", "at_once"), [("planar-arm-7", 4), ("experiments.toys:toss", 2), ("robots_at_once:Odd", 2)]
+)
+def test_a_run_that_was_stopped_goes_on_to_the_rows_of_a_whole_one(
+    go, own, tmp_path, robot, at_once, capfd, monkeypatch
+):
+    monkeypatch.setattr(session, "JOINS_EVERY", 10)
     place = "practice/seed-003"
-    common = [*RUN, robot, *UNJUDGED]
+    common = [*RUN, robot, *UNJUDGED, "--at-once", at_once]
     if robot == "planar-arm-7":
-        common += ["--evaluate-at", "100", "--repeats", "0"]
-    assert go(tmp_path / "whole", *common, "--movements", "200") == 0
-    assert go(tmp_path / "parts", *common, "--movements", "120") == 0
-    assert go(tmp_path / "parts", *common, "--movements", "200", "--resume") == 0
+        common += ["--evaluate-at", "50", "--repeats", "0"]
+    assert go(tmp_path / "whole", *common, "--movements", "98") == 0
+    assert go(tmp_path / "parts", *common, "--movements", "58") == 0
+    assert go(tmp_path / "parts", *common, "--movements", "98", "--resume") == 0
     assert content_of(tmp_path / "whole" / place) == content_of(tmp_path / "parts" / place)
-    assert "after 10" not in capfd.readouterr().err  # the evaluation after 100 movements is kept
+    assert "after 50" not in capfd.readouterr().err  # the evaluation after 50 movements is kept
     found = read_run(tmp_path / "whole" / place)
-    assert found.summary["movements"] == 200
+    assert found.summary["movements"] == 98
     with Record(tmp_path / "whole" / place / RUN_FILE) as record:
         places = [event.place for event in record.events()]
     sizes = [here + 1 for here, after in pairwise([*places, 0]) if after == 0]
-    assert sizes[:60] == [1] * 60
-    assert set(sizes[60:]) == {2, 3, 4}
+    assert sizes[:20] == [1] * 20
+    assert set(sizes[20:]) == {*range(2, at_once + 1)}
 
 
 def test_an_evaluation_comes_after_the_group_in_which_it_falls(go, tmp_path):

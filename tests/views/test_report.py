@@ -125,6 +125,7 @@ def test_the_numbers_of_a_run_are_those_of_its_evaluations(pages, run):
     assert errors["physics (ms)"] == f"{1000 * run.summary['seconds_physics'] / 60:.2f}"
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_run_that_has_hardly_begun_is_reported_and_one_that_was_never_evaluated_comes_last(run, tmp_path):
     nothing = {name: column[:0] for name, column in run.evaluations["own"].items()}
     begun = replace(
@@ -143,6 +144,7 @@ def test_a_run_that_has_hardly_begun_is_reported_and_one_that_was_never_evaluate
     assert "lands" in page(tmp_path, [Variant("sgim-d", [run]), Variant("new", [begun])])
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_run_without_evaluations_is_judged_by_its_own_goals(run, tmp_path):
     goals = np.repeat([[0.0, 0.5], [0.5, 0.0], [0.0, 0.0]], 2, axis=0)  # the nearer of two movements at each counts
     outcomes = goals + np.stack([[0.3, 0.01, 0.2, 0.1, 0.4, np.nan], np.zeros(6)], axis=1)
@@ -212,6 +214,7 @@ def made(run, name, errors):
     return Variant(name, runs)
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_five_seeds_have_intervals_and_a_verdict_and_four_have_points_and_a_note(run, tmp_path):
     variants = [
         made(run, "sgim-d", FIVE),
@@ -256,6 +259,7 @@ def in_unit(run, unit, factor):
     return Variant(unit, [replace(one, spaces={**one.spaces, "outcomes": box}) for one in variant.runs])
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_errors_in_different_units_have_axes_of_their_own_and_no_verdict(run, tmp_path):
     variants = best_first([in_unit(run, "mm", 1e3), in_unit(run, "m", 1), made(run, "worse", [1.0] * 5)])
     assert [variant.name for variant in variants] == ["m", "worse", "mm"]
@@ -270,6 +274,7 @@ def test_errors_in_different_units_have_axes_of_their_own_and_no_verdict(run, tm
     assert "Errors lie between" not in text
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_differences_are_those_to_the_baseline_that_was_chosen(runs, pages, tmp_path):
     out = tmp_path / "page.html"
     assert report.main([str(runs), "--baseline", ODD, "--out", str(out)]) == 0

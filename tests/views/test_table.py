@@ -57,6 +57,7 @@ def rows_of(said):
     return {line[0]: dict(zip(head, line, strict=True)) for line in lines}
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_numbers_are_interquartile_means_with_intervals_if_there_are_five_seeds_as_in_a_report(runs, capsys):
     assert table(runs, "--at", 40) == 0
     said = capsys.readouterr()
