@@ -31,8 +31,7 @@ from sgimd_torch.options.signature import with_keywords_of
 from sgimd_torch.spaces import Array, Demonstration, Failure, check_point
 from sgimd_torch.units import in_rad, units_from, units_of
 
-ANSWERED: Final = 30.0  # ms within which a motor of LeRobot answers, or its packet is lost
-PATIENCE: Final = 0.05  # s in which a call whose packet is lost is tried again
+PATIENCE: Final = 0.06  # s in which a call whose packet is lost is tried again
 PAUSE: Final = 0.01  # s between two tries
 BEGUN: Final = 0.2  # s after which all joints follow their commands
 AHEAD: Final = 0.05  # rad; a stalled joint is farther behind its command, which has gone on by as much
@@ -210,10 +209,7 @@ class LeRobotArm:
     def _made(self) -> tuple[Any, list[Any]]:
         """A robot, and its buses or those of its arms."""
         robot = self._make()
-        buses = [part.bus for part in (robot, *vars(robot).values()) if hasattr(part, "bus")]
-        for port in [bus.port_handler for bus in buses if hasattr(bus, "port_handler")]:
-            port.setPacketTimeout = partial(_wait, port, port.setPacketTimeout)
-        return robot, buses
+        return robot, [part.bus for part in (robot, *vars(robot).values()) if hasattr(part, "bus")]
 
     @contextmanager
     def _torque_off_after_an_error(self) -> Iterator[None]:
@@ -339,12 +335,6 @@ def _error_of(call: Callable[[], Any]) -> BaseException | None:
     except BaseException as error:
         return error
     return None
-
-
-def _wait(port: Any, wait: Callable[[int], None], length: int) -> None:
-    """Wait for a packet of ``length`` bytes, but not longer than ``ANSWERED``."""
-    wait(length)
-    port.packet_timeout = min(port.packet_timeout, ANSWERED)
 
 
 def _reads(buses: list[Any], motor: str) -> str:

@@ -12,7 +12,9 @@ import os
 import platform
 import subprocess
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
+from modulefinder import ModuleFinder
 from pathlib import Path
 from typing import Any, Final
 
@@ -29,6 +31,7 @@ from sgimd_torch.record import Dims, Record, RunError
 from sgimd_torch.runs.signals import say
 
 RUN_FILE: Final = "run.sqlite"
+INSTALLED: Final = {"site-packages", "dist-packages"}  # folders of packages that have versions
 CODE: Final = (*WORDS, "evaluated_by", "robot", "seen_by")  # last words of options that may name a place of code
 THREADS: Final = "environment.threads"
 DEVICE: Final = "inverse.accelerator"
@@ -241,15 +244,32 @@ def versions_of(parts: RunParts) -> dict[str, Any]:
 
 
 def sources(config: Config, robot: Environment) -> dict[str, str]:
-    """File and checksum of each part that is the user's own code, such as "toss.py, crc32 8f0a1b2c", and of a model."""
+    """File and checksum of each part that is the user's own code, such as "toss.py, crc32 8f0a1b2c", and of a model.
+
+    What a part imports from its own folder, or from that of its package, belongs to its code.
+    """
     files = robot.files if isinstance(robot, FromFiles) else ()
     root = os.path.commonpath([path.parent for path in files]) if files else ""
     checksums = {f"file {path.relative_to(root)}": f"crc32 {checksum(path)}" for path in files}
     for word in code_of(config.settings):
-        spec = importlib.util.find_spec(word.partition(":")[0])
+        module = word.partition(":")[0]
+        spec = importlib.util.find_spec(module)
         if spec is not None and spec.has_location and spec.origin:
-            checksums[f"source of {word}"] = f"{Path(spec.origin).name}, crc32 {checksum(Path(spec.origin))}"
+            files_of = {**_imported(module, Path(spec.origin)), word: Path(spec.origin)}
+            checksums |= {f"source of {name}": f"{path.name}, crc32 {checksum(path)}" for name, path in files_of.items()}
     return checksums
+
+
+def _imported(module: str, file: Path) -> dict[str, Path]:
+    """Other modules, by name, that a module in ``file`` needs and that lie in its folder, or in that of its package."""
+    folder = file.parents[module.count(".") + (file.name == "__init__.py")]
+    if INSTALLED & {*folder.parts}:
+        return {}
+    finder = ModuleFinder([str(folder)], excludes=["sgimd_torch"])
+    with suppress(ImportError):
+        finder.import_hook(module)
+    found = {name: Path(each.__file__) for name, each in finder.modules.items() if each.__file__}
+    return {name: path for name, path in found.items() if path != file}
 
 
 def code_of(settings: Mapping[str, Any]) -> list[str]:

@@ -98,8 +98,8 @@ def test_torque_is_off_soon_after_anything_goes_wrong_and_the_next_movement_goes
     at = on.clock.now + 0.3
     on.events[at] = partial(happens, on)
     errors = KeyboardInterrupt if fault == "Ctrl-C" else (SimulationError, KeyError, RuntimeError)
-    with pytest.raises(errors) as failed, warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "torque may still be on")  # an overloaded motor does not confirm it
+    warnings.filterwarnings("ignore", "torque may still be on")  # an overloaded motor does not confirm it
+    with pytest.raises(errors) as failed:
         arm.execute(NONE, FAR, RNG)
     assert re.search(reason, str(failed.value.__context__ if fault == "Ctrl-C" else failed.value))
     assert not on.torque

@@ -66,7 +66,6 @@ class TableArm:
         overloaded: whether the first motor answers with an error, after which no other motor is asked.
         jammed: whether the first joint is stuck.
         asked_off: time when torque was to be switched off last, whether motors heard it or not.
-        packet_timeout: time (ms) that an answer is waited for, as LeRobot's driver sets it before each packet.
     """
 
     def __init__(self, path, clock, *, noise=0.0, lost=0.0, answers=0.0, unit=1.0):
@@ -86,11 +85,6 @@ class TableArm:
     @property
     def bus(self):
         return self
-
-    port_handler = bus
-
-    def setPacketTimeout(self, length):  # noqa: N802
-        self.packet_timeout = 50.0 + length
 
     def degrees(self):
         return np.degrees(self.data.qpos[: self.model.nu])
@@ -141,8 +135,7 @@ class TableArm:
             raise ConnectionError("a packet was lost")
 
     def check_answer(self):
-        self.setPacketTimeout(8)
-        self.clock.now += self.unplugged * self.packet_timeout / 1000
+        self.clock.now += self.unplugged * 0.034  # as LeRobot waits for a Dynamixel motor
         self.pass_time()
         if self.unplugged:
             raise ConnectionError("no such port")
