@@ -255,8 +255,8 @@ def sources(config: Config, robot: Environment) -> dict[str, str]:
         module = word.partition(":")[0]
         spec = importlib.util.find_spec(module)
         if spec is not None and spec.has_location and spec.origin:
-            files_of = {**_imported(module, Path(spec.origin)), word: Path(spec.origin)}
-            checksums |= {f"source of {name}": f"{path.name}, crc32 {checksum(path)}" for name, path in files_of.items()}
+            for name, path in {**_imported(module, Path(spec.origin)), word: Path(spec.origin)}.items():
+                checksums[f"source of {name}"] = f"{path.name}, crc32 {checksum(path)}"
     return checksums
 
 
