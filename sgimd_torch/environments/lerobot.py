@@ -36,9 +36,8 @@ PAUSE: Final = 0.01  # s between two tries
 BEGUN: Final = 0.2  # s after which all joints follow their commands
 AHEAD: Final = 0.05  # rad; a stalled joint is farther behind its command, which has gone on by as much
 HELD: Final = 0.05  # s in which a stalled joint has not moved
-STIRRED: Final = 0.01  # rad, least way of a joint that moves
+MOVED: Final = 0.01  # rad, least way of a joint that moves
 COOLER: Final = 5.0  # degrees C below ``heat`` at which movements go on
-MOVED: Final = 0.02  # rad, least way of an arm that is led
 STILL: Final = 1.0  # s after which an arm that was led and does not move has been led to the end
 GENTLY: Final = 0.5  # share of ``speed`` on the way back to rest
 KEPT: Final = 0.9  # least share of the commands of ``rate`` that are sent without a warning
@@ -197,9 +196,9 @@ class LeRobotArm:
         atexit.unregister(self.release)
         self._command = None
         for bus in self._buses:
-            _error_of(lambda bus=bus: bus.sync_write("Torque_Enable", 0))  # reaches motors that cannot answer, too
-        errors = [error for bus in self._buses if (error := _error_of(bus.disable_torque))]
-        left = _error_of(self.robot.disconnect)
+            _error_of(bus, "sync_write", "Torque_Enable", 0)  # reaches motors that cannot answer, too
+        errors = [error for bus in self._buses if (error := _error_of(bus, "disable_torque"))]
+        left = _error_of(self.robot, "disconnect")
         if errors or left:  # this driver may believe for good that it is connected
             self.robot, self._buses = self._made()
         if left and (errors or not self._buses):
@@ -259,7 +258,7 @@ class LeRobotArm:
             row = min(int((now - begun) / timestep), len(commands) - 1)
             way = speed * (now - then if ticks else 1 / self.rate)
             wanted = self._command + np.clip(commands[row] - self._command, -way, way)
-            free = (np.abs(wanted - measured) <= min(AHEAD, self.step)) | (np.abs(measured - free_posture) > STIRRED)
+            free = (np.abs(wanted - measured) <= min(AHEAD, self.step)) | (np.abs(measured - free_posture) > MOVED)
             free |= now - begun < BEGUN
             free_at[free], free_posture[free] = now, measured[free]
             pushed = np.where(free, 0.0, pushed + np.abs(wanted - self._command))
@@ -328,10 +327,10 @@ class LeRobotArm:
             self._clock.sleep(PAUSE)
 
 
-def _error_of(call: Callable[[], Any]) -> BaseException | None:
-    """What a call raises; also after Ctrl-C the other switches are still to be tried."""
+def _error_of(part: Any, name: str, *given: Any) -> BaseException | None:
+    """What a method of a part of the arm raises; also after Ctrl-C the other switches are still to be tried."""
     try:
-        call()
+        getattr(part, name)(*given)
     except BaseException as error:
         return error
     return None

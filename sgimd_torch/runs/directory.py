@@ -31,7 +31,6 @@ from sgimd_torch.record import Dims, Record, RunError
 from sgimd_torch.runs.signals import say
 
 RUN_FILE: Final = "run.sqlite"
-INSTALLED: Final = {"site-packages", "dist-packages"}  # folders of packages that have versions
 CODE: Final = (*WORDS, "evaluated_by", "robot", "seen_by")  # last words of options that may name a place of code
 THREADS: Final = "environment.threads"
 DEVICE: Final = "inverse.accelerator"
@@ -244,32 +243,29 @@ def versions_of(parts: RunParts) -> dict[str, Any]:
 
 
 def sources(config: Config, robot: Environment) -> dict[str, str]:
-    """File and checksum of each part that is the user's own code, such as "toss.py, crc32 8f0a1b2c", and of a model.
-
-    What a part imports from its own folder, or from that of its package, belongs to its code.
-    """
+    """File and checksum of each part that is the user's own code, such as "toss.py, crc32 8f0a1b2c", and of a model."""
     files = robot.files if isinstance(robot, FromFiles) else ()
     root = os.path.commonpath([path.parent for path in files]) if files else ""
     checksums = {f"file {path.relative_to(root)}": f"crc32 {checksum(path)}" for path in files}
     for word in code_of(config.settings):
-        module = word.partition(":")[0]
-        spec = importlib.util.find_spec(module)
-        if spec is not None and spec.has_location and spec.origin:
-            for name, path in {**_imported(module, Path(spec.origin)), word: Path(spec.origin)}.items():
-                checksums[f"source of {name}"] = f"{path.name}, crc32 {checksum(path)}"
+        checksums |= {f"source of {name}": f"{path.name}, crc32 {checksum(path)}" for name, path in _source(word)}
     return checksums
 
 
-def _imported(module: str, file: Path) -> dict[str, Path]:
-    """Other modules, by name, that a module in ``file`` needs and that lie in its folder, or in that of its package."""
+def _source(word: str) -> list[tuple[str, Path]]:
+    """The file of a part, and those of the modules that it imports from its own folder, or from that of its package."""
+    module = word.partition(":")[0]
+    spec = importlib.util.find_spec(module)
+    if spec is None or not spec.has_location or not spec.origin:
+        return []
+    file = Path(spec.origin)
     folder = file.parents[module.count(".") + (file.name == "__init__.py")]
-    if INSTALLED & {*folder.parts}:
-        return {}
     finder = ModuleFinder([str(folder)], excludes=["sgimd_torch"])
-    with suppress(ImportError):
-        finder.import_hook(module)
-    found = {name: Path(each.__file__) for name, each in finder.modules.items() if each.__file__}
-    return {name: path for name, path in found.items() if path != file}
+    if not {"site-packages", "dist-packages"} & {*folder.parts}:  # else its package has a version
+        with suppress(ImportError):
+            finder.import_hook(module)
+    files = {name: Path(getattr(each, "__file__", None) or file) for name, each in finder.modules.items()}
+    return [(word, file), *((name, path) for name, path in files.items() if path != file)]
 
 
 def code_of(settings: Mapping[str, Any]) -> list[str]:
