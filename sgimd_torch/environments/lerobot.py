@@ -37,6 +37,7 @@ BEGUN: Final = 0.2  # s after which all joints follow their commands
 AHEAD: Final = 0.05  # rad; a stalled joint is farther behind its command, which has gone on by as much
 HELD: Final = 0.05  # s in which a stalled joint has not moved
 MOVED: Final = 0.01  # rad, least way of a joint that moves
+LED: Final = 0.02  # rad, least way of an arm that is led
 COOLER: Final = 5.0  # degrees C below ``heat`` at which movements go on
 STILL: Final = 1.0  # s after which an arm that was led and does not move has been led to the end
 GENTLY: Final = 0.5  # share of ``speed`` on the way back to rest
@@ -182,7 +183,7 @@ class LeRobotArm:
                 self._check_signal()
                 times.append(self._clock.monotonic() - begun)
                 postures.append(self._measured(self._answer(self.robot.get_observation)))
-                if np.abs(postures[-1] - before).max() > MOVED:  # the first one, too
+                if np.abs(postures[-1] - before).max() > LED:  # the first one, too
                     moves.append(len(times) - 1)
                     before = postures[-1]
                 self._clock.sleep(max(0.0, begun + len(times) / self.rate - self._clock.monotonic()))

@@ -211,7 +211,7 @@ def test_a_movement_led_by_hand_becomes_a_lesson(model, tmp_path, monkeypatch, c
     monkeypatch.setattr("sys.stdin", io.StringIO("\n"))
     on.hand = hand
     assert sgimd("demonstrations", "record", "--environment", "arms:led", "--out", tmp_path / "led.npz") == 0
-    assert "led.npz: movement 1, 1.4 s, outcome (0.222, 0.516), misfit 0.004 rad" in capsys.readouterr().out
+    assert "led.npz: movement 1, 1.38 s, outcome (0.222, 0.516), misfit 0.007 rad" in capsys.readouterr().out
     assert not on.torque
     (shown,) = load_demonstrations(tmp_path / "led.npz")
     assert shown.trajectory[-1] == pytest.approx(hand(9.0), abs=0.01)
