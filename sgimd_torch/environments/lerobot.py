@@ -31,10 +31,14 @@ from sgimd_torch.options.signature import with_keywords_of
 from sgimd_torch.spaces import Array, Demonstration, Failure, check_point
 from sgimd_torch.units import in_rad, units_from, units_of
 
-TRIES: Final = 4  # number of tries of a call whose packet is lost
+PATIENCE: Final = 0.06  # s in which a call whose packet is lost is tried again
 PAUSE: Final = 0.01  # s between two tries
-BLOCKED: Final = 0.3  # s after which a joint that is held back by ``step`` and does not move counts as stalled
-MOVED: Final = 0.02  # rad, least way of a joint that moves
+BEGUN: Final = 0.2  # s after which all joints follow their commands
+AHEAD: Final = 0.05  # rad; a stalled joint is farther behind its command, which has gone on by as much
+HELD: Final = 0.05  # s in which a stalled joint has not moved
+MOVED: Final = 0.01  # rad, least way of a joint that moves
+LED: Final = 0.02  # rad, least way of an arm that is led
+COOLER: Final = 5.0  # degrees C below ``heat`` at which movements go on
 STILL: Final = 1.0  # s after which an arm that was led and does not move has been led to the end
 GENTLY: Final = 0.5  # share of ``speed`` on the way back to rest
 KEPT: Final = 0.9  # least share of the commands of ``rate`` that are sent without a warning
@@ -48,7 +52,7 @@ class LeRobotArm:
     The robot needs ``action_features`` with the names of its motors, ``is_connected``, ``connect()`` that switches
     torque on, ``get_observation()`` of positions by motor, ``send_action(positions)`` and ``disconnect()`` that
     switches torque off. A lost packet is an OSError. A ``bus``, of the robot or of each of its arms, is asked for
-    temperatures, and switches torque off first.
+    temperatures, and switches torque off first, by one packet that waits for no answer.
 
     Args:
         robot: LeRobot's name of the robot, such as so101_follower, or package.module:function of yours that makes one.
@@ -65,8 +69,8 @@ class LeRobotArm:
         settle: time (s) between the end of a movement and its outcome, and again at rest before the next movement.
         rate: commands per second.
         speed: highest speed of a command (rad/s).
-        step: largest distance (rad) between a command and the measured position. A joint that stays behind stalls.
-        heat: highest temperature of a motor (degrees C).
+        step: largest distance (rad) between a command and the measured position.
+        heat: highest temperature (degrees C) of a motor; a hotter one cools down, without torque, before it moves on.
         clock: object with ``monotonic()`` and ``sleep(seconds)``, by default the module ``time``.
 
     Raises:
@@ -179,7 +183,7 @@ class LeRobotArm:
                 self._check_signal()
                 times.append(self._clock.monotonic() - begun)
                 postures.append(self._measured(self._answer(self.robot.get_observation)))
-                if np.abs(postures[-1] - before).max() > MOVED:  # the first one, too
+                if np.abs(postures[-1] - before).max() > LED:  # the first one, too
                     moves.append(len(times) - 1)
                     before = postures[-1]
                 self._clock.sleep(max(0.0, begun + len(times) / self.rate - self._clock.monotonic()))
@@ -192,17 +196,14 @@ class LeRobotArm:
         """Switch torque off and disconnect; the next movement connects again."""
         atexit.unregister(self.release)
         self._command = None
-        switches: list[Callable[[], Any]] = [*(bus.disable_torque for bus in self._buses), self.robot.disconnect]
-        errors = list[BaseException]()
-        for switch_off in switches:
-            try:
-                switch_off()
-            except BaseException as error:  # also after Ctrl-C the other switches are still to be tried
-                errors.append(error)
-        if errors:  # this driver may believe for good that it is connected
+        for bus in self._buses:
+            _error_of(bus, "sync_write", "Torque_Enable", 0)  # reaches motors that cannot answer, too
+        errors = [error for bus in self._buses if (error := _error_of(bus, "disable_torque"))]
+        left = _error_of(self.robot, "disconnect")
+        if errors or left:  # this driver may believe for good that it is connected
             self.robot, self._buses = self._made()
-        if len(errors) == len(switches):
-            told = f"torque may still be on, switch off the power: {reason_of(errors[-1])}"
+        if left and (errors or not self._buses):
+            told = f"torque may still be on, switch off the power: {reason_of(left)}"
             warnings.warn(told, RuntimeWarning, stacklevel=2)
 
     def _made(self) -> tuple[Any, list[Any]]:
@@ -251,22 +252,24 @@ class LeRobotArm:
         timestep, clock, ticks = self._twin.model.opt.timestep, self._clock, 0
         moving = np.flatnonzero((commands != commands[-1]).any(axis=1)).max(initial=-1)
         begun = then = due = away_at = clock.monotonic()
-        free_at, free_posture = np.full(len(self.joints), begun), np.full(len(self.joints), np.inf)
+        free_at, free_posture, pushed = (np.zeros(len(self.joints)) for _ in range(3))
         while True:
             self._check_signal()
             now, measured = clock.monotonic(), self._measured(self._answer(self.robot.get_observation))
             row = min(int((now - begun) / timestep), len(commands) - 1)
             way = speed * (now - then if ticks else 1 / self.rate)
-            command = self._command + np.clip(commands[row] - self._command, -way, way)
-            self._command = np.clip(command, measured - self.step, measured + self.step)
+            wanted = self._command + np.clip(commands[row] - self._command, -way, way)
+            free = (np.abs(wanted - measured) <= min(AHEAD, self.step)) | (np.abs(measured - free_posture) > MOVED)
+            free |= now - begun < BEGUN
+            free_at[free], free_posture[free] = now, measured[free]
+            pushed = np.where(free, 0.0, pushed + np.abs(wanted - self._command))
+            for k in np.flatnonzero((pushed > AHEAD) & (now - free_at > HELD)):
+                told = f"{self.joints[k]} stalls at {measured[k]:.3g} rad on its way to {commands[row, k]:.3g}"
+                raise SimulationError(f"{told}; torque is off")
+            self._command = np.clip(wanted, measured - self.step, measured + self.step)
             values = ((self._command - self._shifts) / self._scales).tolist()
             action = {**self._held, **dict(zip(self._motors, values, strict=True))}
             self._answer(partial(self.robot.send_action, action))
-            free = (self._command == command) | (np.abs(measured - free_posture) > MOVED)
-            free_at[free], free_posture[free] = now, measured[free]
-            for k in np.flatnonzero(now - free_at > BLOCKED):
-                told = f"{self.joints[k]} stalls at {measured[k]:.3g} rad on its way to {commands[row, k]:.3g}"
-                raise SimulationError(f"{told}; torque is off")
             ticks, then = ticks + 1, now
             if row <= moving or not np.allclose(self._command, commands[-1], atol=1e-6):
                 away_at = now
@@ -274,22 +277,34 @@ class LeRobotArm:
             clock.sleep(max(0.0, due - clock.monotonic()))  # time passes between two looks at a clock
             if now - away_at >= self.settle:
                 break
-        self._check_heat()
+        self._cool_down()
         sent = (ticks - 1) / max(now - begun, 1e-9)
         if ticks > 1 and sent < KEPT * self.rate and not self._is_slow:
             self._is_slow = True
             told = f"the arm takes {sent:.0f} commands a second, not {self.rate:g}; movements keep their times"
             warnings.warn(f"{told} with fewer commands: --environment.rate", RuntimeWarning, stacklevel=2)
 
-    def _check_heat(self) -> None:
+    def _cool_down(self) -> None:
+        """If a motor is hot, wait without torque until all have cooled down; the movement has failed."""
+        told, limit = "", self.heat
+        while (hottest := max(self._temperatures(), default=(-np.inf, "")))[0] > limit:
+            if not told:
+                for bus in self._buses:
+                    bus.disable_torque()
+                limit -= COOLER
+                told = f"{hottest[1]} is at {hottest[0]:g} degrees C, above {self.heat:g}; torque is off"
+                warnings.warn(f"{told} until it has cooled down to {limit:g}", RuntimeWarning, stacklevel=2)
+            self._check_signal()
+            self._clock.sleep(1.0)
+        if told:
+            raise SimulationError(told)
+
+    def _temperatures(self) -> Iterator[tuple[float, str]]:
+        """The temperature (degrees C) of each motor, and its name, as far as the buses know them."""
         for bus in self._buses:
-            try:
-                temperatures = self._answer(partial(bus.sync_read, "Present_Temperature", normalize=False))
-            except (AttributeError, KeyError, NotImplementedError, TypeError, ValueError):  # this bus does not know it
-                continue
-            for motor, degrees in temperatures.items():
-                if degrees > self.heat:
-                    raise SimulationError(f"{motor} is at {degrees:g} degrees C, above {self.heat:g}; torque is off")
+            with suppress(AttributeError, KeyError, NotImplementedError, TypeError, ValueError):
+                known = self._answer(partial(bus.sync_read, "Present_Temperature", normalize=False))
+                yield from ((degrees, motor) for motor, degrees in known.items())
 
     def _outcome(self) -> Array:
         """``(outcome_dim,)``, where the places are now."""
@@ -303,11 +318,23 @@ class LeRobotArm:
 
     def _answer(self, call: Callable[[], Any]) -> Any:
         """The result of a call of the robot, which is tried again if a packet is lost."""
-        for _ in range(TRIES - 1):
-            with suppress(OSError):
+        begun = self._clock.monotonic()
+        while True:
+            try:
                 return call()
+            except OSError:
+                if self._clock.monotonic() - begun > PATIENCE:
+                    raise
             self._clock.sleep(PAUSE)
-        return call()
+
+
+def _error_of(part: Any, name: str, *given: Any) -> BaseException | None:
+    """What a method of a part of the arm raises; also after Ctrl-C the other switches are still to be tried."""
+    try:
+        getattr(part, name)(*given)
+    except BaseException as error:
+        return error
+    return None
 
 
 def _reads(buses: list[Any], motor: str) -> str:

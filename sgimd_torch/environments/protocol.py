@@ -150,8 +150,7 @@ def primitive_of(environment: Environment) -> Primitive:
     return primitive if isinstance(primitive, Primitive) else Primitive()
 
 
-FAILURES: Final = 10
-"""Number of successive failed movements after which a run ends."""
+FAILURES: Final = 10  # number of successive failed movements after which a run ends
 
 
 class SimulationError(RuntimeError):

@@ -12,7 +12,9 @@ import os
 import platform
 import subprocess
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
+from modulefinder import ModuleFinder
 from pathlib import Path
 from typing import Any, Final
 
@@ -246,10 +248,24 @@ def sources(config: Config, robot: Environment) -> dict[str, str]:
     root = os.path.commonpath([path.parent for path in files]) if files else ""
     checksums = {f"file {path.relative_to(root)}": f"crc32 {checksum(path)}" for path in files}
     for word in code_of(config.settings):
-        spec = importlib.util.find_spec(word.partition(":")[0])
-        if spec is not None and spec.has_location and spec.origin:
-            checksums[f"source of {word}"] = f"{Path(spec.origin).name}, crc32 {checksum(Path(spec.origin))}"
+        checksums |= {f"source of {name}": f"{path.name}, crc32 {checksum(path)}" for name, path in _source(word)}
     return checksums
+
+
+def _source(word: str) -> list[tuple[str, Path]]:
+    """The file of a part, and those of the modules that it imports from its own folder, or from that of its package."""
+    module = word.partition(":")[0]
+    spec = importlib.util.find_spec(module)
+    if spec is None or not spec.has_location or not spec.origin:
+        return []
+    file = Path(spec.origin)
+    folder = file.parents[module.count(".") + (file.name == "__init__.py")]
+    finder = ModuleFinder([str(folder)], excludes=["sgimd_torch"])
+    if not {"site-packages", "dist-packages"} & {*folder.parts}:  # else its package has a version
+        with suppress(ImportError):
+            finder.import_hook(module)
+    files = {name: Path(getattr(each, "__file__", None) or file) for name, each in finder.modules.items()}
+    return [(word, file), *((name, path) for name, path in files.items() if path != file)]
 
 
 def code_of(settings: Mapping[str, Any]) -> list[str]:

@@ -63,7 +63,9 @@ class TableArm:
         sent: time, positions (degrees) and measured positions of all commands.
         temperature: that of all motors (degrees C).
         unplugged: whether nothing answers.
+        overloaded: whether the first motor answers with an error, after which no other motor is asked.
         jammed: whether the first joint is stuck.
+        asked_off: time when torque was to be switched off last, whether motors heard it or not.
     """
 
     def __init__(self, path, clock, *, noise=0.0, lost=0.0, answers=0.0, unit=1.0):
@@ -73,8 +75,8 @@ class TableArm:
         self.rng = np.random.default_rng(0)
         self.joints = [self.model.joint(self.model.actuator_trnid[k, 0]).name for k in range(self.model.nu)]
         self.events, self.sent, self.temperature = {}, [], 30.0
-        self.is_connected = self.torque = self.unplugged = self.jammed = False
-        self.switched_off, self.hand = None, None
+        self.is_connected = self.torque = self.unplugged = self.overloaded = self.jammed = False
+        self.switched_off, self.asked_off, self.hand = None, None, None
 
     @property
     def action_features(self):
@@ -88,9 +90,7 @@ class TableArm:
         return np.degrees(self.data.qpos[: self.model.nu])
 
     def connect(self):
-        self.pass_time()
-        if self.unplugged:
-            raise ConnectionError("no such port")
+        self.check_answer()
         self.is_connected = self.torque = True
         self.data.ctrl[:] = self.data.qpos[: self.model.nu]
 
@@ -107,14 +107,19 @@ class TableArm:
             self.data.ctrl[:] = np.radians(values)
 
     def disable_torque(self):
-        self.pass_time()
-        if self.unplugged:
-            raise ConnectionError("no such port")
-        if self.torque:
+        self.check_answer()
+        self.sync_write("Torque_Enable", 0)
+
+    def sync_write(self, name, value):
+        """Reaches motors, if any, and waits for no answer."""
+        assert (name, value) == ("Torque_Enable", 0)
+        self.asked_off = self.clock.now
+        if self.torque and not self.unplugged:
             self.torque, self.switched_off = False, self.clock.now
 
     def sync_read(self, name, normalize):
         assert (name, normalize) == ("Present_Temperature", False)
+        self.talk()
         return dict.fromkeys(self.joints, self.temperature)
 
     def disconnect(self):
@@ -123,11 +128,19 @@ class TableArm:
 
     def talk(self):
         self.clock.now += self.answers
-        self.pass_time()
-        if self.unplugged or not self.is_connected:
-            raise ConnectionError("no answer")
+        self.check_answer()
+        if not self.is_connected:
+            raise ConnectionError("not connected")
         if self.rng.random() < self.lost:
             raise ConnectionError("a packet was lost")
+
+    def check_answer(self):
+        self.clock.now += self.unplugged * 0.034  # as LeRobot waits for a Dynamixel motor
+        self.pass_time()
+        if self.unplugged:
+            raise ConnectionError("no such port")
+        if self.overloaded:
+            raise RuntimeError("Overload error!")
 
     def pass_time(self):
         """Move on until now."""

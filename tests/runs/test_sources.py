@@ -12,7 +12,7 @@ from sgimd_torch import PlanarArm
 from sgimd_torch.files import checksum
 from sgimd_torch.options.command_line import main, parse
 from sgimd_torch.options.config import Config
-from sgimd_torch.runs.directory import sources
+from sgimd_torch.runs.directory import changed_versions, sources
 from sgimd_torch.runs.read import finished
 from sgimd_torch.runs.signals import command
 from sgimd_torch.views import ask
@@ -50,6 +50,26 @@ def test_the_file_of_every_part_of_ones_own_is_kept_and_told_when_it_has_changed
     assert [each["source of sliders:Slider"] for each in before] == [kept]
     sys.modules.pop("answers")
     assert sources(Config(), PlanarArm()) == {}
+
+
+@pytest.mark.parametrize("place", ["thrown:make", "lab.thrown:make"])
+def test_modules_that_a_part_imports_from_its_own_folder_belong_to_its_source(tmp_path, monkeypatch, place):
+    monkeypatch.syspath_prepend(tmp_path)
+    folder = tmp_path / "lab" if "lab" in place else tmp_path
+    folder.mkdir(exist_ok=True)
+    package = "lab." * ("lab" in place)
+    (folder / "__init__.py").write_text("")
+    imported = "import numpy", "from sgimd_torch import PlanarArm as make", f"from {package}arm import LENGTH"
+    (folder / "thrown.py").write_text("\n".join(imported))
+    (folder / "arm.py").write_text(f"def late():\n    from {package}deeper import x\nLENGTH = 1\n")
+    (folder / "unused.py").write_text("")
+    (folder / "deeper.py").write_text("")
+    config = Config.from_settings({"environment": place})
+    before = sources(config, PlanarArm())
+    (folder / "deeper.py").write_text("x = 1\n")
+    (folder / "unused.py").write_text("x = 1\n")
+    changes = changed_versions(before, sources(config, PlanarArm()))
+    assert re.fullmatch(rf"source of {package}deeper deeper.py, crc32 \w+ -> deeper.py, crc32 \w+", changes)
 
 
 @pytest.mark.parametrize("view", [ask, film])
