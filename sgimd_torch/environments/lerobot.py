@@ -252,20 +252,23 @@ class LeRobotArm:
         timestep, clock, ticks = self._twin.model.opt.timestep, self._clock, 0
         moving = np.flatnonzero((commands != commands[-1]).any(axis=1)).max(initial=-1)
         begun = then = due = away_at = clock.monotonic()
-        free_at, free_posture, pushed = (np.zeros(len(self.joints)) for _ in range(3))
+        free_at, free_posture, pushed, push = (np.zeros(len(self.joints)) for _ in range(4))
+        wanted = self._command
         while True:
             self._check_signal()
             now, measured = clock.monotonic(), self._measured(self._answer(self.robot.get_observation))
             row = min(int((now - begun) / timestep), len(commands) - 1)
-            way = speed * (now - then if ticks else 1 / self.rate)
-            wanted = self._command + np.clip(commands[row] - self._command, -way, way)
+            # A joint can have followed the command before this one, at best.
             free = (np.abs(wanted - measured) <= min(AHEAD, self.step)) | (np.abs(measured - free_posture) > MOVED)
             free |= now - begun < BEGUN
             free_at[free], free_posture[free] = now, measured[free]
-            pushed = np.where(free, 0.0, pushed + np.abs(wanted - self._command))
+            pushed = np.where(free, 0.0, pushed + push)
             for k in np.flatnonzero((pushed > AHEAD) & (now - free_at > HELD)):
                 told = f"{self.joints[k]} stalls at {measured[k]:.3g} rad on its way to {commands[row, k]:.3g}"
                 raise SimulationError(f"{told}; torque is off")
+            way = speed * (now - then if ticks else 1 / self.rate)
+            wanted = self._command + np.clip(commands[row] - self._command, -way, way)
+            push = np.abs(wanted - self._command)
             self._command = np.clip(wanted, measured - self.step, measured + self.step)
             values = ((self._command - self._shifts) / self._scales).tolist()
             action = {**self._held, **dict(zip(self._motors, values, strict=True))}
