@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numba import float64, njit
 
-from sgimd_torch.memory.jit import LISTS, NUMBERS, TABLE, as_columns, compiled_for, jit_helper, squared_distance
+from sgimd_torch.memory.jit import LISTS, NUMBERS, ROWS, TABLE, as_columns, compiled_for, jit_helper, squared_distance
 from sgimd_torch.spaces import Array
 
 STEPS: Final = 4  # largest number of Gauss-Newton steps from each start
@@ -349,6 +349,13 @@ def answer(
             outcome, variance = prediction(process, in_lengths(best, context, scaling))
             sd = np.sqrt(max(1.0, surprise) * (variance + process.variance * kernel[3]))
     return best.copy(), outcome.copy(), sd
+
+
+@compiled_for(TABLE, TABLE, ROWS, NUMBERS)
+def gross_errors(inputs: Array, outcomes: Array, rows: np.ndarray, kernel: Array) -> np.ndarray:
+    """Whether each movement in ``rows`` is a gross error, see `fitted_process`. Other arguments: see `answer`."""
+    process, _ = process_of(rows, inputs, outcomes, kernel)
+    return process.noises > kernel[3]
 
 
 @compiled_for(TABLE, TABLE, LISTS, TABLE, NUMBERS)

@@ -28,6 +28,7 @@ _FITTED: Final = 300  # number of exemplars, drawn from all, to which lengths ar
 _GROUPS: Final = 8  # number of groups of neighbours that determine the kernel
 _GROUP: Final = 60  # number of exemplars in each group
 _MOST_ALIKE: Final = 100  # number of exemplars to which a process is fitted
+_LITTLE: Final = 1e-3  # least variance of the noise when gross errors are looked for, relative to that of outcomes
 _FAR: Final = 1e3  # distance from 0, in standard deviations, beyond which inputs are shifted to 0 against rounding
 
 
@@ -150,15 +151,31 @@ class LocalProcess(Inverse):
         if not np.ptp(outcomes, axis=0).any():
             return
         order = stream(n, "fit of a local process").permutation(n)
-        drawn = order[:_FITTED]
-        lengths = fit_lengths((unscaled[drawn] - origin) / self._spreads, outcomes[drawn])
-        self._units = np.stack((origin, self._spreads * lengths))
-        self._inputs = Neighbours(Table(unscaled.shape[1], self._scaled(0)[:n]))
+        standard = (unscaled - origin) / self._spreads
+        groups = [*self._fit_lengths(standard, outcomes, order, origin)]
+        gross = np.concatenate([rows[self._gross(outcomes, rows)] for rows in groups])
+        left = order[~np.isin(order, gross)]
+        if len(left) < n and np.ptp(outcomes[left[:_FITTED]], axis=0).any():
+            groups = [rows[~np.isin(rows, gross)] for rows in self._fit_lengths(standard, outcomes, left, origin)]
         inputs = self._inputs.keys.rows
-        groups = self._inputs.nearest(inputs[order[:_GROUPS]], _GROUP)
         varied = [rows for rows in groups if np.ptp(outcomes[rows], axis=0).any()]
         if varied:
             self._kernel = np.array(choose_kernel([(inputs[rows], outcomes[rows]) for rows in varied], self.noise))
+
+    def _fit_lengths(self, standard: Array, outcomes: Array, order: Rows, origin: Array) -> Rows:
+        """Fit lengths to the first exemplars of ``order``; rows of groups of neighbours, ``(groups, k)``."""
+        lengths = fit_lengths(standard[order[:_FITTED]], outcomes[order[:_FITTED]])
+        self._units = np.stack((origin, self._spreads * lengths))
+        self._inputs = Neighbours(Table(standard.shape[1], self._scaled(0)[: len(standard)]))
+        return self._inputs.nearest(self._inputs.keys.rows[order[:_GROUPS]], _GROUP)
+
+    def _gross(self, outcomes: Array, rows: Rows) -> np.ndarray:
+        """Whether each of ``rows`` is a gross error to a smooth process. A rough one would explain gross errors."""
+        variance = float(outcomes[rows].var(axis=0).mean())
+        noise = min(max(self.noise**2 / variance, _LITTLE), 1.0) if variance else 1.0
+        kernels, kernel = compiled("sgimd_torch.inverses.kernels"), np.array([1.0, 1.0, 0.0, noise])
+        gross: np.ndarray = kernels.gross_errors(self._inputs.keys.rows, outcomes, rows, kernel)
+        return gross
 
     def _scaled(self, first: int) -> Array:
         """Inputs from row ``first`` on, in lengths."""

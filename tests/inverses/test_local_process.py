@@ -229,6 +229,18 @@ def test_a_gross_error_is_explained_by_noise_and_predictions_hardly_change(rows:
         assert predicted(inputs, wrong, kernel, inputs[row])[0] == pytest.approx(outcomes[row], abs=0.2)
 
 
+def test_gross_errors_do_not_decide_lengths_and_kernel() -> None:
+    inputs, outcomes = waves(200)
+    points = stream(0, "points").uniform(0, 3, (50, 2))
+    expected = np.stack([np.sin(points.sum(axis=1)), np.cos(points[:, 0])], axis=1)
+    wrong = outcomes.copy()
+    wrong[::20] = stream(0, "gross errors").uniform(-1, 1, (10, 2))
+    inverse = LocalProcess(remembering(inputs, wrong))
+    errors = [np.linalg.norm(inverse.predict(NO_CONTEXT, point) - y) for point, y in zip(points, expected, strict=True)]
+    assert np.mean(errors) < 0.01
+    assert inverse.fitted().kernel[2] == 0  # no rough part
+
+
 @pytest.mark.parametrize("far", [25.0, 50.0])
 def test_a_wide_movement_after_many_nearly_alike_is_answered(far: float) -> None:
     rng = np.random.default_rng(0)
