@@ -6,15 +6,14 @@ A run is the file ``run.sqlite`` in OUT/NAME/seed-003; ``docs/runs.md`` explains
 
 from __future__ import annotations
 
+import ast
 import importlib.metadata
 import importlib.util
 import os
 import platform
 import subprocess
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import replace
-from modulefinder import ModuleFinder
 from pathlib import Path
 from typing import Any, Final
 
@@ -260,12 +259,28 @@ def _source(word: str) -> list[tuple[str, Path]]:
         return []
     file = Path(spec.origin)
     folder = file.parents[module.count(".") + (file.name == "__init__.py")]
-    finder = ModuleFinder([str(folder)], excludes=["sgimd_torch"])
-    if not {"site-packages", "dist-packages"} & {*folder.parts}:  # else its package has a version
-        with suppress(ImportError):
-            finder.import_hook(module)
-    files = {name: Path(getattr(each, "__file__", None) or file) for name, each in finder.modules.items()}
-    return [(word, file), *((name, path) for name, path in files.items() if path != file)]
+    files = {word: file}
+    if file.suffix == ".py" and not {"site-packages", "dist-packages"} & {*file.parts}:  # else it has a version
+        _add_imported(module, file, folder, files)
+    return [*files.items()]
+
+
+def _add_imported(module: str, file: Path, folder: Path, files: dict[str, Path]) -> None:
+    """Add to ``files`` those in ``folder`` that a module imports, inside functions too, and what these import."""
+    package = module if file.name == "__init__.py" else module.rpartition(".")[0]
+    names = list[str]()
+    for node in ast.walk(ast.parse(file.read_bytes())):
+        if isinstance(node, ast.Import):
+            names += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            origin = importlib.util.resolve_name("." * node.level + (node.module or ""), package)
+            names += [origin, *(f"{origin}.{alias.name}" for alias in node.names)]
+    for name in names:
+        path = folder.joinpath(*name.split("."))
+        for imported in (path.with_suffix(".py"), path / "__init__.py"):
+            if imported.is_file() and imported not in files.values() and not name.startswith("sgimd_torch"):
+                files[name] = imported
+                _add_imported(name, imported, folder, files)
 
 
 def code_of(settings: Mapping[str, Any]) -> list[str]:

@@ -52,13 +52,15 @@ def test_the_file_of_every_part_of_ones_own_is_kept_and_told_when_it_has_changed
     assert sources(Config(), PlanarArm()) == {}
 
 
+@pytest.mark.parametrize("is_package", [True, False])
 @pytest.mark.parametrize("place", ["thrown:make", "lab.thrown:make"])
-def test_modules_that_a_part_imports_from_its_own_folder_belong_to_its_source(tmp_path, monkeypatch, place):
+def test_modules_that_a_part_imports_from_its_own_folder_belong_to_its_source(tmp_path, monkeypatch, place, is_package):
     monkeypatch.syspath_prepend(tmp_path)
     folder = tmp_path / "lab" if "lab" in place else tmp_path
     folder.mkdir(exist_ok=True)
     package = "lab." * ("lab" in place)
-    (folder / "__init__.py").write_text("")
+    if is_package:
+        (folder / "__init__.py").write_text("")
     imported = "import numpy", "from sgimd_torch import PlanarArm as make", f"from {package}arm import LENGTH"
     (folder / "thrown.py").write_text("\n".join(imported))
     (folder / "arm.py").write_text(f"def late():\n    from {package}deeper import x\nLENGTH = 1\n")
