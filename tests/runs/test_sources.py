@@ -56,6 +56,8 @@ def test_the_file_of_every_part_of_ones_own_is_kept_and_told_when_it_has_changed
 @pytest.mark.parametrize("place", ["thrown:make", "lab.thrown:make"])
 def test_modules_that_a_part_imports_from_its_own_folder_belong_to_its_source(tmp_path, monkeypatch, place, is_package):
     monkeypatch.syspath_prepend(tmp_path)
+    for name in ("thrown", "lab", "lab.thrown"):
+        sys.modules.pop(name, None)
     folder = tmp_path / "lab" if "lab" in place else tmp_path
     folder.mkdir(exist_ok=True)
     package = "lab." * ("lab" in place)
