@@ -54,8 +54,7 @@ class GoalBabbling(Strategy):
         tolerance: distance, in the unit of outcomes, at which a goal counts as reached; None for the outcome noise, but
             at least .02. With a budget of 1 this option has no effect.
         global_range: least and greatest probability of a movement by the explorer instead of the search. The
-            probability rises with the distance of the goal from the nearest reached outcome. An explorer that has a
-            `share` of its own, such as `Returning`, decides instead.
+            probability rises with the goal's distance from the nearest reached outcome; a `share` of the explorer wins.
         give_up: competence (0: reached, -1: worst) below which a goal is given up after a movement without progress; -1
             for never. With a budget of 1 this option has no effect. Deviation: the paper spends the whole budget on
             each goal. If the task space is far larger than the reachable part, nearly all movements are then wasted.

@@ -125,13 +125,13 @@ def solve_transposed(lower: Array, b: Array) -> None:
 
 
 @jit_helper
-def fitted_process(inputs: Array, outcomes: Array, kernel: Array) -> tuple[GaussianProcess, Array]:
-    """The process of movements with ``inputs`` ``(dim, n)`` and ``outcomes`` ``(outcome_dim, n)``; its `precisions`.
+def fitted_process(rows: np.ndarray, inputs: Array, outcomes: Array, kernel: Array) -> tuple[GaussianProcess, Array]:
+    """The process of the movements in ``rows``, and its `precisions`; other arguments: see `answer`.
 
     The movement that all others contradict most gets the noise that explains it, then the next one, until none is
     contradicted. So gross errors, such as those of a camera that loses the object, hardly count. A movement far from
     all others is contradicted by none."""
-    n = outcomes.shape[1]
+    n, inputs, outcomes = len(rows), as_columns(inputs, rows), as_columns(outcomes, rows)
     covariance, _ = covariance_matrix(inputs, kernel)
     noises = np.full(n, kernel[3])
     for _ in range(1 + OUTLIERS):
@@ -147,12 +147,6 @@ def fitted_process(inputs: Array, outcomes: Array, kernel: Array) -> tuple[Gauss
             break
         noises[outlier] += (largest - 1) / precision[outlier]
     return process, precision
-
-
-@jit_helper
-def process_of(rows: np.ndarray, inputs: Array, outcomes: Array, kernel: Array) -> tuple[GaussianProcess, Array]:
-    """`fitted_process` of the movements in ``rows``."""
-    return fitted_process(as_columns(inputs, rows), as_columns(outcomes, rows), kernel)
 
 
 @jit_helper
@@ -215,17 +209,8 @@ def expected(process: GaussianProcess, covariance: Array) -> Array:
 
 
 @jit_helper
-def prediction(process: GaussianProcess, point: Array) -> tuple[Array, float]:
-    """Expected outcome of a movement with the input ``point`` ``(dim,)``, and its variance, without noise."""
-    covariance, slope = np.empty(process.inputs.shape[1]), np.empty(process.inputs.shape[1])
-    covariances(process.inputs, process.kernel, point, covariance, slope)
-    return expected(process, covariance), variance_at(process, covariance)
-
-
-@jit_helper
 def expected_error(process: GaussianProcess, goal: Array, inflation: float, covariance: Array, limit: float) -> float:
-    """Expected squared error, the variance times ``inflation`` included. A result of ``limit`` or more
-    is not exact: the error is at least ``limit``, too."""
+    """Expected squared error, with ``inflation`` times the variance; inexact, and at least ``limit``, from there on."""
     error = squared_distance(expected(process, covariance), goal)
     return error if error >= limit else error + inflation * variance_at(process, covariance)
 
@@ -319,7 +304,7 @@ def answer(
     for start in range(n_starts):
         if start == 0 or k < len(inputs):  # else the process of all movements serves every start
             rows = alike[start]
-            process, precision = process_of(rows, inputs, outcomes, kernel)
+            process, precision = fitted_process(rows, inputs, outcomes, kernel)
         surprise = 0.0  # mean squared residual near the start
         for row in alike[start, :JUDGED]:
             j = int(np.argmax(rows == row))
@@ -346,16 +331,16 @@ def answer(
             error, theta = error_of_end, end
         if error + scatter < least:
             least, best = error + scatter, theta.copy()
-            outcome, variance = prediction(process, in_lengths(best, context, scaling))
+            covariances(process.inputs, kernel, in_lengths(best, context, scaling), covariance, slope)
+            outcome, variance = expected(process, covariance), variance_at(process, covariance)
             sd = np.sqrt(max(1.0, surprise) * (variance + process.variance * kernel[3]))
     return best.copy(), outcome.copy(), sd
 
 
 @compiled_for(TABLE, TABLE, ROWS, NUMBERS)
 def gross_errors(inputs: Array, outcomes: Array, rows: np.ndarray, kernel: Array) -> np.ndarray:
-    """Whether each movement in ``rows`` is a gross error, see `fitted_process`. Other arguments: see `answer`."""
-    process, _ = process_of(rows, inputs, outcomes, kernel)
-    return process.noises > kernel[3]
+    """Whether each movement in ``rows`` is a gross error, see `fitted_process`."""
+    return fitted_process(rows, inputs, outcomes, kernel)[0].noises > kernel[3]
 
 
 @compiled_for(TABLE, TABLE, LISTS, TABLE, NUMBERS)
@@ -376,7 +361,7 @@ def predictions(
     covariance, slope = np.empty(near.shape[1]), np.empty(near.shape[1])
     for i in range(n):
         rows, point = near[i].copy(), points[i].copy()
-        process, _ = process_of(rows, inputs, outcomes, kernel)
+        process, _ = fitted_process(rows, inputs, outcomes, kernel)
         covariances(process.inputs, kernel, point, covariance, slope)
         outcome[i] = expected(process, covariance)
         variances[i] = variance_at(process, covariance)

@@ -104,8 +104,7 @@ class LocalProcess(Inverse):
         return Estimate(theta, thetas, memory.outcomes[near], context, expected, sd)
 
     def predict(self, context: Array, theta: Array) -> Array | None:
-        """Expected outcome ``(outcome_dim,)`` of ``theta``, from similar movements. While all outcomes are equal, the
-        prediction is that outcome. While there are too few exemplars, it is None."""
+        """Expected outcome ``(outcome_dim,)``, from similar movements; None while there are too few exemplars."""
         prediction = self.predict_variance(context, theta)
         return None if prediction is None else prediction[0]
 
@@ -151,31 +150,27 @@ class LocalProcess(Inverse):
         if not np.ptp(outcomes, axis=0).any():
             return
         order = stream(n, "fit of a local process").permutation(n)
-        standard = (unscaled - origin) / self._spreads
-        groups = [*self._fit_lengths(standard, outcomes, order, origin)]
-        gross = np.concatenate([rows[self._gross(outcomes, rows)] for rows in groups])
-        left = order[~np.isin(order, gross)]
-        if len(left) < n and np.ptp(outcomes[left[:_FITTED]], axis=0).any():
-            groups = [rows[~np.isin(rows, gross)] for rows in self._fit_lengths(standard, outcomes, left, origin)]
-        inputs = self._inputs.keys.rows
+        standard, gross = (unscaled - origin) / self._spreads, order[:0]
+        for last in (False, True):  # at last without gross errors
+            drawn = order[:_FITTED]
+            self._units = np.stack((origin, self._spreads * fit_lengths(standard[drawn], outcomes[drawn])))
+            self._inputs = Neighbours(Table(unscaled.shape[1], self._scaled(0)[:n]))
+            inputs = self._inputs.keys.rows
+            groups = [rows[~np.isin(rows, gross)] for rows in self._inputs.nearest(inputs[order[:_GROUPS]], _GROUP)]
+            gross = gross if last else np.concatenate([self._gross(outcomes, rows) for rows in groups])
+            left = order[~np.isin(order, gross)]
+            if len(left) == len(order) or not np.ptp(outcomes[left[:_FITTED]], axis=0).any():
+                break
+            order = left
         varied = [rows for rows in groups if np.ptp(outcomes[rows], axis=0).any()]
         if varied:
             self._kernel = np.array(choose_kernel([(inputs[rows], outcomes[rows]) for rows in varied], self.noise))
 
-    def _fit_lengths(self, standard: Array, outcomes: Array, order: Rows, origin: Array) -> Rows:
-        """Fit lengths to the first exemplars of ``order``; rows of groups of neighbours, ``(groups, k)``."""
-        lengths = fit_lengths(standard[order[:_FITTED]], outcomes[order[:_FITTED]])
-        self._units = np.stack((origin, self._spreads * lengths))
-        self._inputs = Neighbours(Table(standard.shape[1], self._scaled(0)[: len(standard)]))
-        return self._inputs.nearest(self._inputs.keys.rows[order[:_GROUPS]], _GROUP)
-
-    def _gross(self, outcomes: Array, rows: Rows) -> np.ndarray:
-        """Whether each of ``rows`` is a gross error to a smooth process. A rough one would explain gross errors."""
-        variance = float(outcomes[rows].var(axis=0).mean())
-        noise = min(max(self.noise**2 / variance, _LITTLE), 1.0) if variance else 1.0
-        kernels, kernel = compiled("sgimd_torch.inverses.kernels"), np.array([1.0, 1.0, 0.0, noise])
-        gross: np.ndarray = kernels.gross_errors(self._inputs.keys.rows, outcomes, rows, kernel)
-        return gross
+    def _gross(self, outcomes: Array, rows: Rows) -> Rows:
+        """Those of ``rows`` that are gross errors to a smooth process; a rough one would explain them."""
+        noise = self.noise**2 / (float(outcomes[rows].var(axis=0).mean()) or 1.0)
+        kernels, kernel = compiled("sgimd_torch.inverses.kernels"), np.array([1, 1, 0, min(max(noise, _LITTLE), 1.0)])
+        return rows[kernels.gross_errors(self._inputs.keys.rows, outcomes, rows, kernel)]
 
     def _scaled(self, first: int) -> Array:
         """Inputs from row ``first`` on, in lengths."""

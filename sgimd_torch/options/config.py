@@ -27,8 +27,6 @@ OF_TEACHING: Final = ("demonstrations", "teacher", "teachers", "social")  # opti
 LEAST: Final = {"seed": 0, "movements": 1, "repeats": 0, "failures": 1, "at_once": 1, "evaluate_at": 1, "floor_at": 1}
 """Least value of an option, or of each of its numbers."""
 MOST_MOVEMENTS: Final = 10**8
-START: Final = "import sys; from sgimd_torch.__main__ import main; sys.exit(main())"
-"""Program for ``python -c`` that does what ``sgimd`` does."""
 
 
 @dataclass(frozen=True)
@@ -217,7 +215,8 @@ class Config:
     @property
     def program(self) -> tuple[str, ...]:
         """Program for ``python -c``, and its arguments, that start or resume the run."""
-        return START, "run", "--resume", *words(self)
+        sgimd = "import sys; from sgimd_torch.__main__ import main; sys.exit(main())"
+        return sgimd, "run", "--resume", *words(self)
 
     @property
     def evaluations(self) -> list[int]:

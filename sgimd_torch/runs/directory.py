@@ -6,9 +6,7 @@ A run is the file ``run.sqlite`` in OUT/NAME/seed-003; ``docs/runs.md`` explains
 
 from __future__ import annotations
 
-import ast
 import importlib.metadata
-import importlib.util
 import os
 import platform
 import subprocess
@@ -246,41 +244,11 @@ def sources(config: Config, robot: Environment) -> dict[str, str]:
     files = robot.files if isinstance(robot, FromFiles) else ()
     root = os.path.commonpath([path.parent for path in files]) if files else ""
     checksums = {f"file {path.relative_to(root)}": f"crc32 {checksum(path)}" for path in files}
-    for word in code_of(config.settings):
-        checksums |= {f"source of {name}": f"{path.name}, crc32 {checksum(path)}" for name, path in _source(word)}
+    if words := code_of(config.settings):
+        from sgimd_torch.runs.own_code import sources_of  # most runs have no code of the user's
+
+        checksums |= {f"source of {name}": f"{path.name}, crc32 {checksum(path)}" for name, path in sources_of(words)}
     return checksums
-
-
-def _source(word: str) -> list[tuple[str, Path]]:
-    """The file of a part, and those of the modules that it imports from its own folder, or from that of its package."""
-    module = word.partition(":")[0]
-    spec = importlib.util.find_spec(module)
-    if spec is None or not spec.has_location or not spec.origin:
-        return []
-    file = Path(spec.origin)
-    folder = file.parents[module.count(".") + (file.name == "__init__.py")]
-    files = {word: file}
-    if file.suffix == ".py" and not {"site-packages", "dist-packages"} & {*file.parts}:  # else it has a version
-        _add_imported(module, file, folder, files)
-    return [*files.items()]
-
-
-def _add_imported(module: str, file: Path, folder: Path, files: dict[str, Path]) -> None:
-    """Add to ``files`` those in ``folder`` that a module imports, inside functions too, and what these import."""
-    package = module if file.name == "__init__.py" else module.rpartition(".")[0]
-    names = list[str]()
-    for node in ast.walk(ast.parse(file.read_bytes())):
-        if isinstance(node, ast.Import):
-            names += [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
-            origin = importlib.util.resolve_name("." * node.level + (node.module or ""), package)
-            names += [origin, *(f"{origin}.{alias.name}" for alias in node.names)]
-    for name in names:
-        path = folder.joinpath(*name.split("."))
-        for imported in (path.with_suffix(".py"), path / "__init__.py"):
-            if imported.is_file() and imported not in files.values() and not name.startswith("sgimd_torch"):
-                files[name] = imported
-                _add_imported(name, imported, folder, files)
 
 
 def code_of(settings: Mapping[str, Any]) -> list[str]:

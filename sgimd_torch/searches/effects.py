@@ -27,8 +27,7 @@ _ROUNDING: Final = 1e-9  # assumed noise if an environment has none, relative to
 _LEAST_NUMBER: Final = 16  # least number of exemplars on a plateau
 _MOST: Final = 0.5  # least share of all exemplars on a plateau when it is found
 _LEAST_SHARE: Final = 0.1  # least share later, as more and more movements have an effect
-# Of the points within 4 sd of a plateau, at least this share must lie within 2 sd. Without a plateau, about half do.
-_DENSE: Final = 0.9
+_DENSE: Final = 0.9  # least share of the points within 4 sd that lie within 2 sd; without a plateau, about half do
 
 
 class Effects:
@@ -55,10 +54,8 @@ class Effects:
         if self._n_searched < int(size) <= n:
             self._n_searched = int(size)
             self._plateau = self._find_plateau()
-            self._effective, self._seen = (
-                Memory(self.memory.context_dim, self.memory.theta_dim, self.memory.outcome_dim),
-                0,
-            )
+            self._effective = Memory(self.memory.context_dim, self.memory.theta_dim, self.memory.outcome_dim)
+            self._seen = 0
         if self._plateau is None:
             return None
         new = slice(self._seen, n)

@@ -37,15 +37,14 @@ class Anywhere(Explore):
 class Returning(Explore):
     """First around the middle of Pi, then anywhere; if effects are rare, variations of movements that had an effect.
 
-    While every movement has an effect, the first movements are a uniform share of the way from the middle of Pi to a
-    uniform movement: small movements can often be predicted from few exemplars, large ones cannot. Later global
-    movements are uniform in Pi. Their probability is ``first`` / n after n movements, within bounds.
+    While every movement has an effect, the first movements go a uniform share of the way from the middle of Pi to a
+    uniform movement, because small movements can often be predicted from few exemplars. Later global movements are
+    uniform in Pi; their probability is ``first`` / n after n movements, within bounds.
 
     Otherwise movements are uniform in Pi until one has an effect; then half of them are variations of a movement that
     had an effect in a similar context. Forestier et al. (2022) reach goals for an object by variations of movements
-    that moved the object. Go-Explore (Ecoffet et al. 2021) returns to a state before it explores. Variations become
-    wider after a variation with an effect, else narrower, as by the success rule of evolution strategies (Rechenberg
-    1973).
+    that moved the object. Go-Explore (Ecoffet et al. 2021) returns to a state before it explores. Variations widen
+    after one with an effect, else narrow: the success rule of evolution strategies (Rechenberg 1973).
 
     Args:
         problem: problem to learn. If its inverse model reports no ``effects``, every movement counts as effective.
@@ -70,8 +69,7 @@ class Returning(Explore):
 
     @property
     def share(self) -> float:
-        """Probability of a global movement: 1 for the ``first`` movements, and, if effects are rare, until 16 movements
-        had one. Later on uniform movements have the same probability whether effects are rare or not."""
+        """Probability of a global movement; 1, too, if effects are rare and fewer than 16 movements had one."""
         n = len(self.problem.memory)
         if n < self.first:
             return 1.0
@@ -86,8 +84,7 @@ class Returning(Explore):
         if effective is None:
             middle = (policies.low + policies.high) / 2
             is_uniform = len(self.problem.memory) >= self.first or self.rng.random() < self.uniform
-            size = 1.0 if is_uniform else self.rng.random()
-            return policies.clip(middle + size * (anywhere - middle))
+            return policies.clip(middle + (1.0 if is_uniform else self.rng.random()) * (anywhere - middle))
         if len(self.problem.memory) > self._seen:  # several robots may move at once
             for theta in self._varied:
                 has_effect = bool(policies.same(effective.thetas, theta).any())

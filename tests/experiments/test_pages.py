@@ -116,7 +116,7 @@ def test_a_page_names_the_groups_whose_rows_are_not_all_of_this_learning(tmp_pat
 def test_what_was_not_run_is_left_out_of_a_table_and_named(tmp_path):
     found = Evidence.of(write_rows(tmp_path, without=["practice-interest"]))
     text, page = filled("LEARNING", found, tmp_path)
-    assert "| ... and a second family: `practice` | 0.0" in text
+    assert "| ... and goals within reach: `practice` | 0.0" in text
     assert "... but with goals by interest |" not in text
     assert "practice-interest at 1000" in page.missing
 

@@ -46,8 +46,7 @@ def waves(n: int = 30) -> tuple[Array, Array]:
 
 
 def fitted(inputs: Array, outcomes: Array, kernel: Kernel) -> kernels.GaussianProcess:
-    columns = (np.ascontiguousarray(table.T) for table in (inputs, outcomes))
-    process, _ = kernels.fitted_process(*columns, np.array(kernel))
+    process, _ = kernels.fitted_process(np.arange(len(inputs)), inputs, outcomes, np.array(kernel))
     return process
 
 
