@@ -41,8 +41,10 @@ def _add_imported(module: str, file: Path, folder: Path, files: dict[str, Path])
             origin = importlib.util.resolve_name("." * node.level + (node.module or ""), package)
             names += [origin, *(f"{origin}.{alias.name}" for alias in node.names)]
     for name in names:
+        if name.partition(".")[0] == "sgimd_torch":  # it has a version
+            continue
         path = folder.joinpath(*name.split("."))
         for imported in (path.with_suffix(".py"), path / "__init__.py"):
-            if imported.is_file() and imported not in files.values() and not name.startswith("sgimd_torch"):
+            if imported.is_file() and imported not in files.values():
                 files[name] = imported
                 _add_imported(name, imported, folder, files)
