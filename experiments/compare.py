@@ -184,9 +184,8 @@ def jobs_of(experiment: str, only: Sequence[str], seeds: Sequence[int] | None, o
     configs = []
     for seed in SEEDS[experiment] if seeds is None else seeds:
         for variant in chosen:
-            run: Variant = {"seed": seed, "out": out, "name": variant, "floor_at": ()} | EXPERIMENTS[experiment][
-                variant
-            ]
+            line = EXPERIMENTS[experiment][variant]
+            run: Variant = {"seed": seed, "out": out, "name": variant, "floor_at": (), **line}
             if run.get("demonstrations") in MADE:
                 run["demonstrations"] = out / "demonstrations" / run["demonstrations"]
             config = Config.from_settings(run)

@@ -157,9 +157,10 @@ class LocalProcess(Inverse):
             self._inputs = Neighbours(Table(unscaled.shape[1], self._scaled(0)[:n]))
             inputs = self._inputs.keys.rows
             groups = [rows[~np.isin(rows, gross)] for rows in self._inputs.nearest(inputs[order[:_GROUPS]], _GROUP)]
-            gross = gross if last else np.concatenate([self._gross(outcomes, rows) for rows in groups])
+            if last or not len(gross := np.concatenate([self._gross(outcomes, rows) for rows in groups])):
+                break
             left = order[~np.isin(order, gross)]
-            if len(left) == len(order) or not np.ptp(outcomes[left[:_FITTED]], axis=0).any():
+            if not np.ptp(outcomes[left[:_FITTED]], axis=0).any():
                 break
             order = left
         varied = [rows for rows in groups if np.ptp(outcomes[rows], axis=0).any()]
