@@ -88,8 +88,10 @@ index: of equally near exemplars the newest first | memory/scan.py | memory/test
     squared[position - 1] > distance ==> squared[position - 1] >= distance
 index: the radius is squared once | memory/neighbours.py | memory/test_memory.py
     np.where(squared <= within * within, rows, -1) ==> np.where(squared <= within, rows, -1)
-index: a larger k gets the rows of the last query | memory/neighbours.py | memory/test_neighbours.py
-    last_query != key or rows.shape[1] < min(n, max(k, LISTED)) or ==> last_query != key or
+index: a list misses the first new row | memory/neighbours.py | memory/test_neighbours.py
+    keys[rows], self._compared[rows], rows ==> keys[rows], self._compared[rows] + 1, rows
+gross errors: precisions keep what they were | inverses/kernels.py | inverses/test_local_process.py
+    precision[j] -= shrinking * column[j] ** 2 ==> precision[j] -= 0 * column[j]
 a Gaussian process with another kernel | inverses/kernels.py | inverses/test_local_process.py
     5 / 3 * distance**2) * decay ==> 5 / 2 * distance**2) * decay
 requests: a teacher without a reply costs nothing | asking/strategy.py | asking/test_asking.py

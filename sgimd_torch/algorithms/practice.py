@@ -21,7 +21,7 @@ from sgimd_torch.memory import Memory
 from sgimd_torch.options.signature import with_keywords_of
 from sgimd_torch.parts import Problem, Social
 from sgimd_torch.searches.explore import Returning
-from sgimd_torch.searches.perturb import Vary
+from sgimd_torch.searches.vary import Vary
 from sgimd_torch.strategies import GoalBabbling, Imitate
 
 PRACTICE: Final[dict[str, Any]] = {

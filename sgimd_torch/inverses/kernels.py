@@ -7,13 +7,25 @@ Import this module through `compiled`: loading numba takes half a second.
 
 from __future__ import annotations
 
-import math
 from typing import Final, NamedTuple
 
 import numpy as np
-from numba import float64, njit
+from numba import float64
 
-from sgimd_torch.memory.jit import LISTS, NUMBERS, ROWS, TABLE, as_columns, compiled_for, jit_helper, squared_distance
+from sgimd_torch.memory.jit import (
+    LISTS,
+    NUMBERS,
+    ROWS,
+    TABLE,
+    as_columns,
+    compiled_for,
+    factorised,
+    jit_helper,
+    solve,
+    solve_lower,
+    solve_transposed,
+    squared_distance,
+)
 from sgimd_torch.spaces import Array
 
 STEPS: Final = 4  # largest number of Gauss-Newton steps from each start
@@ -26,10 +38,6 @@ OUTLIERS: Final = 8  # largest number of gross errors among the exemplars of a p
 USUAL: Final = 4.0  # largest squared residual that counts in full when the usual one is computed
 TINY: Final = 1e-300  # guard against 0 where a number is divided or its logarithm is taken
 ROOT5: Final = float(np.sqrt(5))
-LOG2: Final = math.log(2)
-LOG2_HIGH: Final = 0.693147180369123816  # first digits of log 2, so few that n times this number is exact
-LOG2_LOW: Final = 1.90821492927058770e-10  # log 2 - LOG2_HIGH
-TERMS: Final = tuple(1 / math.factorial(k) for k in range(13, 0, -1))  # of the series of e^r, all but 1
 
 
 class GaussianProcess(NamedTuple):
@@ -55,23 +63,10 @@ class GaussianProcess(NamedTuple):
     variance: float
 
 
-@njit(nogil=True, forceinline=True)
-def exponential(x: float) -> float:
-    """e^x = 2^n e^r for x <= 0. Numba computes several at once, four times faster than `np.exp`, which saves a fifth of
-    the time of an answer. Sums must not be reordered, or r would lose digits; so it is no `jit_helper`."""
-    x = max(x, -700.0)
-    n = np.rint(x / LOG2)
-    r = x - n * LOG2_HIGH - n * LOG2_LOW
-    series = 0.0
-    for term in TERMS:
-        series = (series + term) * r
-    return (1 + series) * np.int64((np.int64(n) + 1023) << 52).view(np.float64)
-
-
 @jit_helper
 def matern(distance: float) -> tuple[float, float]:
     """Matern 5/2 kernel, and its derivative divided by the distance."""
-    decay = exponential(-ROOT5 * distance)
+    decay = np.exp(-ROOT5 * distance)
     return (1 + ROOT5 * distance + 5 / 3 * distance**2) * decay, -5 / 3 * (1 + ROOT5 * distance) * decay
 
 
@@ -106,25 +101,6 @@ def covariance_matrix(inputs: Array, kernel: Array) -> tuple[Array, Array]:
 
 
 @jit_helper
-def solve_lower(lower: Array, b: Array) -> None:
-    """``b`` ``(n,)`` becomes ``lower``^-1 b."""
-    for i in range(len(b)):
-        total = 0.0
-        for k in range(i):
-            total += lower[i, k] * b[k]
-        b[i] = (b[i] - total) / lower[i, i]
-
-
-@jit_helper
-def solve_transposed(lower: Array, b: Array) -> None:
-    """``b`` ``(n,)`` becomes ``lower``^-T b."""
-    for i in range(len(b) - 1, -1, -1):
-        b[i] /= lower[i, i]
-        for k in range(i):
-            b[k] -= lower[i, k] * b[i]
-
-
-@jit_helper
 def fitted_process(rows: np.ndarray, inputs: Array, outcomes: Array, kernel: Array) -> tuple[GaussianProcess, Array]:
     """The process of the movements in ``rows``, and its `precisions`; other arguments: see `answer`.
 
@@ -133,10 +109,9 @@ def fitted_process(rows: np.ndarray, inputs: Array, outcomes: Array, kernel: Arr
     all others is contradicted by none."""
     n, inputs, outcomes = len(rows), as_columns(inputs, rows), as_columns(outcomes, rows)
     covariance, _ = covariance_matrix(inputs, kernel)
-    noises = np.full(n, kernel[3])
-    for _ in range(1 + OUTLIERS):
-        process = process_with(inputs, outcomes, kernel, covariance, noises)
-        precision = precisions(process.factor)
+    process = process_with(inputs, outcomes, kernel, covariance)
+    precision = precisions(process.factor)
+    for _ in range(OUTLIERS):
         largest, outlier, usual = 0.0, 0, 0.0
         for j in range(n):
             residual = squared_residual(process, j, precision[j])
@@ -145,26 +120,53 @@ def fitted_process(rows: np.ndarray, inputs: Array, outcomes: Array, kernel: Arr
                 largest, outlier = residual, j
         if largest < GROSS * max(1.0, usual):
             break
-        noises[outlier] += (largest - 1) / precision[outlier]
+        process = with_noise(process, precision, outlier, (largest - 1) / precision[outlier])
     return process, precision
 
 
 @jit_helper
-def process_with(inputs: Array, outcomes: Array, kernel: Array, covariance: Array, noises: Array) -> GaussianProcess:
-    """The process of movements with this ``covariance`` ``(n, n)``, the lower half alone, and these ``noises``."""
+def process_with(inputs: Array, outcomes: Array, kernel: Array, covariance: Array) -> GaussianProcess:
+    """The process of movements with this ``covariance`` ``(n, n)``, without noise, the lower half alone."""
     m, n = outcomes.shape
-    noisy = covariance.copy()
-    for i in range(n):
-        noisy[i, i] += noises[i]
-    factor = np.ascontiguousarray(np.linalg.cholesky(noisy))
-    weights, mean, total = np.empty((m, n)), np.empty(m), 0.0
+    factor, weights, mean, variance = factorised(covariance, kernel[3]), np.empty((m, n)), np.empty(m), 0.0
     for k in range(m):
         mean[k] = outcomes[k].sum() / n
-        weights[k] = outcomes[k] - mean[k]
+        for j in range(n):
+            weights[k, j] = outcomes[k, j] - mean[k]
         solve_lower(factor, weights[k])
-        total += weights[k] @ weights[k]
+        variance += weights[k] @ weights[k] / (n * m)
         solve_transposed(factor, weights[k])
-    return GaussianProcess(inputs, kernel, factor, noises.copy(), weights, mean, max(total / (n * m), TINY))
+    return GaussianProcess(inputs, kernel, factor, np.full(n, kernel[3]), weights, mean, max(variance, TINY))
+
+
+@jit_helper
+def with_noise(process: GaussianProcess, precision: Array, outlier: int, noise: float) -> GaussianProcess:
+    """The process with this variance added to the noise of one movement, and its ``precision``, both in place: updates
+    of rank one, of the inverse covariance by Sherman and Morrison's formula, of the factor by rotations."""
+    factor, weights, variance, (m, n) = process.factor, process.weights, process.variance, process.weights.shape
+    column, change = np.zeros(n), np.zeros(n)
+    column[outlier], change[outlier] = 1.0, np.sqrt(noise)
+    solve_lower(factor, column)
+    solve_transposed(factor, column)
+    shrinking = noise / (1 + noise * column[outlier])
+    for j in range(n):
+        precision[j] -= shrinking * column[j] ** 2
+    for k in range(m):
+        weight = weights[k, outlier]
+        for j in range(n):
+            weights[k, j] -= shrinking * weight * column[j]
+        variance -= shrinking * weight**2 / (n * m)
+    process.noises[outlier] += noise
+    for k in range(outlier, n):
+        diagonal = np.sqrt(factor[k, k] ** 2 + change[k] ** 2)
+        cosine, sine = factor[k, k] / diagonal, change[k] / diagonal
+        factor[k, k] = diagonal
+        for i in range(k + 1, n):
+            below = factor[i, k]
+            factor[i, k], change[i] = cosine * below + sine * change[i], cosine * change[i] - sine * below
+    return GaussianProcess(
+        process.inputs, process.kernel, factor, process.noises, weights, process.mean, max(variance, TINY)
+    )
 
 
 @jit_helper
@@ -252,7 +254,9 @@ def descend(
         residual, gram = goal - expected(process, covariance[0]), jacobian @ jacobian.T
         mean_gram, best_try = np.trace(gram) / m + TINY, 0  # best_try 0: no try is better
         for d in range(len(DAMPINGS)):
-            step = np.linalg.solve(gram + mean_gram * DAMPINGS[d] * np.eye(m), residual) @ jacobian
+            pull = residual.copy()
+            solve(gram, mean_gram * DAMPINGS[d], pull)
+            step = pull @ jacobian
             for i in range(t):
                 tried[d, i] = min(max(best[i] + spreads[i] * step[i], box[0, i]), box[1, i])
             point = in_lengths(tried[d], context, scaling)
@@ -262,7 +266,9 @@ def descend(
                 least, best_try = error, 1 + d
         if not best_try:
             break
-        best, covariance[0], slope[0] = tried[best_try - 1].copy(), covariance[best_try], slope[best_try]
+        best = tried[best_try - 1].copy()
+        for j in range(n):
+            covariance[0, j], slope[0, j] = covariance[best_try, j], slope[best_try, j]
     return least, best
 
 
@@ -363,12 +369,14 @@ def predictions(
         rows, point = near[i].copy(), points[i].copy()
         process, _ = fitted_process(rows, inputs, outcomes, kernel)
         covariances(process.inputs, kernel, point, covariance, slope)
-        outcome[i] = expected(process, covariance)
-        variances[i] = variance_at(process, covariance)
-        noises[i] = process.variance * kernel[3]
+        variances[i], noises[i] = variance_at(process, covariance), process.variance * kernel[3]
+        means = expected(process, covariance)
         for k in range(m):
+            outcome[i, k] = means[k]
             weighted_slopes = process.weights[k] * slope
-            slopes[i, k] = point * weighted_slopes.sum() - process.inputs @ weighted_slopes
+            weighted_inputs, total = process.inputs @ weighted_slopes, weighted_slopes.sum()
+            for d in range(dim):
+                slopes[i, k, d] = point[d] * total - weighted_inputs[d]
     return outcome, variances, noises, slopes
 
 

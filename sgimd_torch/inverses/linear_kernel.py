@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from sgimd_torch.memory.jit import LISTS, NUMBERS, TABLE, as_columns, compiled_for, jit_helper, squared_distance
+from sgimd_torch.memory.jit import LISTS, NUMBERS, TABLE, as_columns, compiled_for, jit_helper, solve, squared_distance
 from sgimd_torch.spaces import Array
 
 ALPHA: Final = 0.5  # weight of a neighbourhood's spread in eq. (8); its distance to the goal has weight 1
@@ -61,17 +61,15 @@ def locally_linear(alike: np.ndarray, thetas: Array, outcomes: Array, goal: Arra
     weights /= max(SMALLEST, WIDTH * weights.mean())
     weights = np.exp(0.5 * (weights.min() ** 2 - weights**2))  # eq. (9), see `inverses.local`
     weights /= weights.sum()
-    theta, outcome, largest = near_thetas @ weights, near_outcomes @ weights, np.abs(near_outcomes).max()
-    theta_deviations, outcome_deviations = near_thetas, near_outcomes  # in place, by the loops below
+    theta, outcome = near_thetas @ weights, near_outcomes @ weights
     for k in range(len(theta)):  # a mean lies between the values that it averages; rounding must not move it out
         theta[k] = min(max(theta[k], near_thetas[k].min()), near_thetas[k].max())
-        theta_deviations[k] -= theta[k]
-    for k in range(len(outcome)):
-        outcome_deviations[k] -= outcome[k]
+    theta_deviations, outcome_deviations = near_thetas - theta[:, None], near_outcomes - outcome[:, None]
     covariance = (outcome_deviations * weights) @ outcome_deviations.T
     variance = np.trace(covariance)
-    if variance > (COINCIDENT * largest) ** 2:
-        pull_to_goal = np.linalg.solve(covariance + RIDGE * variance * np.eye(len(goal)), goal - outcome)
+    if variance > (COINCIDENT * np.abs(near_outcomes).max()) ** 2:
+        pull_to_goal = goal - outcome
+        solve(covariance, RIDGE * variance, pull_to_goal)
         step = theta_deviations @ (weights * (pull_to_goal @ outcome_deviations))
         theta = np.minimum(np.maximum(theta + step, box[0]), box[1])
     return best, theta

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import importlib
 import os
+import subprocess
 import sys
 import tempfile
 import zlib
@@ -56,9 +57,13 @@ def compiled(name: str) -> ModuleType:
 
 
 def compile_all() -> None:
-    """Compile all functions that are not in the cache yet."""
-    for name in MODULES:
-        compiled(f"sgimd_torch.{name}")
+    """Compile all functions that are not in the cache yet, half of them in a second process."""
+    *names, largest = (f"sgimd_torch.{name}" for name in MODULES)
+    program = f"from {__name__} import compiled; compiled({largest!r})"
+    with subprocess.Popen([sys.executable, "-c", program], stderr=subprocess.DEVNULL):
+        for name in names:
+            compiled(name)
+    compiled(largest)  # if the second process failed, its error is raised here
 
 
 @cache

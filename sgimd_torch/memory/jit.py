@@ -1,4 +1,4 @@
-"""What compiled functions share: types of arguments, decorators, columns of tables, distances."""
+"""What compiled functions share: types of arguments, decorators, columns of tables, distances, linear equations."""
 
 from __future__ import annotations
 
@@ -43,3 +43,44 @@ def as_columns(table: Array, rows: np.ndarray) -> Array:
         for k in range(len(selected)):
             selected[k, j] = table[rows[j], k]
     return selected
+
+
+@jit_helper
+def factorised(matrix: Array, ridge: float) -> Array:
+    """Cholesky factor ``(n, n)`` of the symmetric ``matrix`` plus ``ridge`` on its diagonal; the lower halves count.
+    Compiling `np.linalg.cholesky` and `np.linalg.solve` would take five seconds."""
+    factor = np.zeros(matrix.shape)
+    for i in range(len(matrix)):
+        for j in range(i + 1):
+            total = 0.0
+            for k in range(j):
+                total += factor[i, k] * factor[j, k]
+            factor[i, j] = (matrix[i, j] - total) / factor[j, j] if j < i else np.sqrt(matrix[i, i] - total + ridge)
+    return factor
+
+
+@jit_helper
+def solve_lower(factor: Array, b: Array) -> None:
+    """``b`` ``(n,)`` becomes ``factor``^-1 b."""
+    for i in range(len(b)):
+        total = 0.0
+        for k in range(i):
+            total += factor[i, k] * b[k]
+        b[i] = (b[i] - total) / factor[i, i]
+
+
+@jit_helper
+def solve_transposed(factor: Array, b: Array) -> None:
+    """``b`` ``(n,)`` becomes ``factor``^-T b."""
+    for i in range(len(b) - 1, -1, -1):
+        b[i] /= factor[i, i]
+        for k in range(i):
+            b[k] -= factor[i, k] * b[i]
+
+
+@jit_helper
+def solve(matrix: Array, ridge: float, b: Array) -> None:
+    """``b`` ``(n,)`` becomes (``matrix`` + ``ridge`` I)^-1 b."""
+    factor = factorised(matrix, ridge)
+    solve_lower(factor, b)
+    solve_transposed(factor, b)

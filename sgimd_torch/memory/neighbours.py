@@ -45,7 +45,6 @@ class Neighbours:
         # For each row the list of its nearest rows, their squared distances, and the number of rows compared so far.
         self._rows, self._squared = np.empty((0, LISTED), np.int64), np.empty((0, LISTED))
         self._compared = np.empty(0, np.int64)
-        self._last = b"", self._rows, self._squared, 0  # last query, its neighbours, and the number of rows compared
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Neighbours, (self.keys,)
@@ -59,21 +58,6 @@ class Neighbours:
         """
         rows, squared = self._search(queries, k)
         return np.where(squared <= within * within, rows, -1)
-
-    def nearest_to(self, query: Array, k: int) -> Rows:
-        """Result of `nearest` for one ``query`` ``(dim,)``; asked again, only newer rows are compared.
-
-        Raises:
-            ValueError: ``k`` is below 1.
-        """
-        n, (last_query, rows, squared, compared), key = len(self.keys), self._last, query.tobytes()
-        if last_query != key or rows.shape[1] < min(n, max(k, LISTED)) or not 1 <= k <= n <= EXACT_UP_TO:
-            rows, squared = self._search(query[None], max(k, LISTED) if 1 <= k <= n <= EXACT_UP_TO else k)
-        elif compared < n:
-            rows, squared = rows.copy(), squared.copy()
-            _scan().extend(self.keys.rows, query[None], np.array([compared]), np.zeros(1, np.int64), rows, squared)
-        self._last = key, rows, squared, n
-        return rows[0, :k]
 
     def around(self, rows: Rows, k: int, within: float = math.inf) -> Rows:
         """Result of `nearest` for each of ``rows``, from lists that are kept: only newer rows are compared.

@@ -40,7 +40,8 @@ goals        goals.within_reach         within-reach=WithinReach
 goals        asking.interest            strategic=StrategicInterest
 progress     goals.regions              gained=gained_progress absolute=absolute_progress
 search       searches.simplex           nelder-mead=NelderMead
-search       searches.perturb           perturb=Perturb vary=Vary
+search       searches.perturb           perturb=Perturb
+search       searches.vary              vary=Vary
 search       rivals.cma_es              cma-es=CmaEs
 search       forward_model.search       gradient=GradientSearch gradient-then-nelder-mead=GradientThenNelderMead
 explore      searches.explore           anywhere=Anywhere returning=Returning

@@ -1,4 +1,4 @@
-"""The simplest searches: the best movement so far plus noise, or theta_g plus noise.
+"""A simple search: the best movement so far plus noise.
 
 search = Perturb(problem)(estimate, goal); theta = next(search); theta = search.send(outcome) ...
 """
@@ -11,6 +11,7 @@ from collections.abc import Generator
 import numpy as np
 
 from sgimd_torch.parts import Problem, Search
+from sgimd_torch.searches.vary import positive
 from sgimd_torch.spaces import Array, Estimate
 
 
@@ -31,7 +32,7 @@ class Perturb(Search):
 
     def __init__(self, problem: Problem, *, sd: float = 0.05) -> None:
         super().__init__(problem)
-        self.sd = _positive(sd)
+        self.sd = positive(sd)
 
     def __call__(self, start: Estimate, goal: Array) -> Generator[Array, Array, None]:
         """Movements around ``start``."""
@@ -50,41 +51,6 @@ class Perturb(Search):
         return policies.clip(self.rng.normal(theta, self.sd * policies.sides))
 
 
-class Vary(Search):
-    """Answer of the inverse model plus a little Gaussian noise.
-
-    All movements vary theta_g; their outcomes do not change the search. Movements are clipped to Pi; the search never
-    ends.
-
-    The search is meant for an accurate inverse model and for one or two movements at each goal. The outcomes correct
-    the inverse model, and show how the outcome changes with theta.
-
-    Args:
-        problem: problem to learn.
-        sd: standard deviation of the noise, as a fraction of each parameter's range in Pi.
-
-    Raises:
-        ValueError: ``sd`` is not positive.
-    """
-
-    def __init__(self, problem: Problem, *, sd: float = 0.03) -> None:
-        super().__init__(problem)
-        self.sd = _positive(sd)
-
-    def __call__(self, start: Estimate, goal: Array) -> Generator[Array, Array, None]:
-        """Movements around theta_g of ``start``."""
-        policies = self.problem.policies
-        theta = policies.check("theta of the estimate", start.theta)
-        while True:
-            yield policies.clip(self.rng.normal(theta, self.sd * policies.sides))
-
-
 def _remembered(start: Estimate) -> bool:
     """Whether theta_g is a copy of one of the thetas of the estimate."""
     return bool((start.thetas == start.theta).all(axis=1).any())
-
-
-def _positive(sd: float) -> float:
-    if not sd > 0:
-        raise ValueError(f"sd must be positive, got {sd}; without noise nothing new is tried")
-    return sd

@@ -223,7 +223,14 @@ def test_a_gross_error_is_explained_by_noise_and_predictions_hardly_change(rows:
     (inputs, outcomes), kernel = waves(60), Kernel(1.0, 1.0, 0.0, 1e-4)
     wrong = outcomes.copy()
     wrong[rows] += [2.0, -3.0]
-    assert np.flatnonzero(fitted(inputs, wrong, kernel).noises > kernel.noise).tolist() == rows
+    process, precision = kernels.fitted_process(np.arange(60), inputs, wrong, np.array(kernel))
+    assert np.flatnonzero(process.noises > kernel.noise).tolist() == rows
+    covariance = covariances(kernel, np.linalg.norm(inputs[:, None] - inputs, axis=2)) + np.diag(process.noises)
+    deviations, inverse = (wrong - wrong.mean(axis=0)).T, np.linalg.inv(covariance)
+    assert process.factor @ process.factor.T == pytest.approx(covariance)
+    assert process.weights == pytest.approx(deviations @ inverse)
+    assert process.variance == pytest.approx((deviations @ inverse * deviations).mean())
+    assert precision == pytest.approx(np.diag(inverse))
     for row in rows:
         assert predicted(inputs, wrong, kernel, inputs[row])[0] == pytest.approx(outcomes[row], abs=0.2)
 

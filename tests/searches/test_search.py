@@ -10,8 +10,9 @@ from scipy.optimize import minimize, rosen
 from sgimd_torch.options.catalogue import WORDS
 from sgimd_torch.options.signature import options_of
 from sgimd_torch.searches.explore import Returning
-from sgimd_torch.searches.perturb import Perturb, Vary
+from sgimd_torch.searches.perturb import Perturb
 from sgimd_torch.searches.simplex import NelderMead, simplex_descent
+from sgimd_torch.searches.vary import Vary
 from sgimd_torch.spaces import Array, Box, Estimate, stream
 from worlds import World, drive, part, problem
 
