@@ -6,6 +6,7 @@ On random robots, the sample is the robots.
 
 from __future__ import annotations
 
+from functools import cache
 from itertools import product
 from typing import Final
 
@@ -101,6 +102,7 @@ def table(page: Page) -> str:
     return markdown(("mean, worst", *map(str, COUNTS)), rows)
 
 
+@cache
 def judged(evidence: Evidence, at: int) -> pd.DataFrame:
     """`practice` and random movements, compared by robot over seeds.
 

@@ -67,13 +67,18 @@ def test_where_nothing_can_be_written_it_compiles_for_this_process_alone(package
     assert started(package, **nowhere).communicate() == ("3 4\n", SAID)
 
 
-NEAREST = """
+CALLING = """
+import numpy as np
+from sgimd_torch.memory.jit import NUMBERS, compiled_for, squared_distance
+
+@compiled_for(NUMBERS)
+def squared_length(point):
+    return squared_distance(point, np.zeros(1))
+"""
+CALL = """
 import numpy as np
 from sgimd_torch.memory.compiled import compiled
-outcomes = np.array([[5.0], [1.0]])
-alike, box = np.array([[0], [1]]), np.array([[0.0], [9.0]])
-kernels = compiled("sgimd_torch.inverses.linear_kernel")
-print(kernels.locally_linear(alike, outcomes, outcomes, np.array([1.0]), box)[0])
+print(compiled("sgimd_torch.memory.scan").squared_length(np.array([3.0])))
 """
 
 
@@ -85,17 +90,18 @@ compiled("sgimd_torch.nothing")
 
 def test_a_damaged_cache_is_made_again_and_a_change_of_what_compiled_code_calls_takes_effect(package, tmp_path):
     mine = {"NUMBA_CACHE_DIR": str(tmp_path / "mine")}
-    assert started(package, NEAREST, **mine).communicate() == ("1\n", SAID)
+    (package / "memory" / "scan.py").write_text(CALLING)  # compiled in a moment
+    assert started(package, CALL, **mine).communicate() == ("9.0\n", SAID)
     (path,) = (tmp_path / "mine").rglob("*.nbc")
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 1  # of the machine code: numba would not notice it
     path.write_bytes(content)
-    assert started(package, NEAREST, **mine).communicate() == ("1\n", SAID)
+    assert started(package, CALL, **mine).communicate() == ("9.0\n", SAID)
     assert "No module named 'sgimd_torch.nothing'" in started(package, MISSING, **mine).communicate()[1]
-    assert started(package, NEAREST, **mine).communicate() == ("1\n", "")  # an error of another kind removes nothing
+    assert started(package, CALL, **mine).communicate() == ("9.0\n", "")  # an error of another kind removes nothing
     called = package / "memory" / "jit.py"
     called.write_text(called.read_text().replace("total += (one[k] - other[k]) ** 2", "total -= one[k]"))
-    assert started(package, NEAREST, **mine).communicate() == ("0\n", SAID)
+    assert started(package, CALL, **mine).communicate() == ("-3.0\n", SAID)
 
 
 @pytest.mark.slow
