@@ -54,10 +54,7 @@ class Competence(Judge):
         self._asked: tuple[bytes, bytes, int] | None = None
 
     def __call__(self, context: Array, goal: Array, outcomes: Array | None = None) -> float:
-        """Competence in [-1, 0], -1 for an empty memory; ``outcomes`` is not used, as they are in memory already.
-
-        Further calls with the same context and goal, as during an attempt, compare only newer exemplars.
-        """
+        """Competence in [-1, 0], -1 for an empty memory; ``outcomes`` is not used, as they are in memory already."""
         memory = self.problem.memory
         if not len(memory):
             return -1.0

@@ -19,7 +19,8 @@ LEGEND: Final[Mapping[str, str]] = {
     "better than rest. R is all of C x T, R0 and R1 are its two parts, R01 is a part of R0; map/competence shows the "
     "regions. Each run has its own regions. After a cut of a region, its curve is the mean over its parts' goals. If "
     "the goal model has no regions, as in practice, the board makes regions from the learner's own goals; the "
-    "competence of a goal is then that of its attempt's nearest outcome, eq. (7). The learner does not use them.",
+    "competence of a goal is then that of its attempt's nearest outcome, eq. (7). The learner does not use them. As "
+    "practice prefers goals that it is unsure of, they may stay low while error/mean falls.",
     "interest": "Recent change of competence in a region, eq. (3). A goal model with regions draws more goals where "
     "interest is high. After a cut of a region, its curve is the mean over its parts' goals.",
     "regions": "Number of regions of the goal model, or of those that the board makes.",
@@ -47,7 +48,7 @@ LEGEND: Final[Mapping[str, str]] = {
     "time": "Time (s) spent so far, by part of the run. Replayed movements have no times.",
     "map/competence": "Regions, named as in the curves, coloured by the mean competence of the goals they remember.",
     "map/error": "Benchmark goals, coloured by their error at this evaluation. The logarithmic scale depends on T "
-    "alone, so runs can be compared.",
+    "alone, so runs can be compared. If T has one dimension, errors over goals.",
 }
 
 

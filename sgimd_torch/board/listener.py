@@ -29,6 +29,7 @@ from sgimd_torch.spaces import Box, Episode
 
 EVERY: Final = 50  # number of movements from one point of a curve to the next
 NO_REGIONS: Final = f"No competence per region: the learner pursued no goal of its own in its first {EVERY} movements."
+HAS_REGIONS: Final = "From here on competence/*, interest/* and map/competence show regions."
 
 
 class EventFile:
@@ -100,10 +101,12 @@ class BoardListener(EventFile):
         super().__init__(folder)
         self._config, self._learner, self._seconds, self._curves = parts.config, parts.learner, seconds, curves
         self._space: Box = parts.environment.outcomes
+        self._contexts: Box = parts.environment.contexts
         self._benchmark: Benchmark = parts.benchmark
         self._behaviour = Behaviour(parts.learner.problem.tolerance, parts.config.at_once)
         self._own = OwnRegions(parts.learner.problem)
         self._movements = self._drawn_at = self._changes = 0
+        self._has_regions = True  # until a board without them says so
         self._explained: set[str] = set()
         # The result on TensorBoard's page of hyperparameters.
         result = "error/mean" if parts.config.evaluations else "goals/missed_by"
@@ -120,8 +123,9 @@ class BoardListener(EventFile):
             if not self._learner.regions:
                 self._own.follow(self._behaviour)
             regions = self._learner.regions or self._own.regions
-            if not regions and self._movements == EVERY:
-                self.add(EVERY, summary.text("about/regions", NO_REGIONS))
+            if bool(regions) != self._has_regions:
+                self._has_regions = bool(regions)
+                self.add(self._movements, summary.text("about/regions", HAS_REGIONS if regions else NO_REGIONS))
             self._scalars({**self._behaviour.curves(), **region_curves(regions)})
             if not replayed:
                 self._scalars({f"time/{name.removeprefix('seconds_')}": s for name, s in self._seconds().items()})
@@ -142,7 +146,7 @@ class BoardListener(EventFile):
         self._scalars({**evaluation_curves(own, self._benchmark.side / 2), **others})
         if movements >= 2 * self._drawn_at or movements == self._config.movements:
             self._drawn_at = movements
-            maps = maps_of(self._learner.regions or self._own.regions, self._space, goals, own.errors)
+            maps = maps_of(self._learner.regions or self._own.regions, self._space, self._contexts, goals, own.errors)
             pictures = {tag: summary.image(tag, picture, dataformats="HWC") for tag, picture in maps.items()}
             self._show("images", {tag: made.value[0] for tag, made in pictures.items()})
 

@@ -23,7 +23,7 @@ from sgimd_torch.goals.regions import Region
 from sgimd_torch.spaces import Array, Box
 
 # Errors of the first and the last colour, as shares of T's longest side; constant, so that runs can be compared.
-SCALE: Final = (0.0005, 0.15)
+SCALE: Final = (0.0005, 0.5)
 NARROW: Final = 0.2  # share of the width of the map; the name of a narrower region is turned by 90 degrees
 WIDE: Final = 2.5  # width (inches) of the axes of a picture, without the colour bar
 MARGIN: Final = 0.7  # height (inches) of the space above and below the axes together
@@ -31,12 +31,14 @@ MARGIN: Final = 0.7  # height (inches) of the space above and below the axes tog
 STYLE: Any = {"font.size": 10, "axes.titlesize": 10, "text.parse_math": False}
 
 
-def maps_of(regions: Sequence[Region], space: Box, goals: Array, errors: Array) -> dict[str, NDArray[np.uint8]]:
+def maps_of(
+    regions: Sequence[Region], space: Box, contexts: Box, goals: Array, errors: Array
+) -> dict[str, NDArray[np.uint8]]:
     """Pictures ``(height, width, 4)`` by tag; if T has more than two dimensions, each picture shows several sections.
 
     Args:
         regions: regions of the goal model; if empty, there is no picture of them.
-        space: T.
+        space, contexts: T and C.
         goals: ``(n, outcome_dim)`` goals of the benchmark.
         errors: ``(n,)`` errors of the goals, in the unit of T.
     """
@@ -44,11 +46,11 @@ def maps_of(regions: Sequence[Region], space: Box, goals: Array, errors: Array) 
     pictures["map/error"] = lambda ax, section: _errors(ax, goals, errors, space, section)
     if regions:
         pictures["map/competence"] = lambda ax, section: _competence(ax, regions, section)
-    return {tag: _pixels(picture, sections(space)) for tag, picture in pictures.items()}
+    return {tag: _pixels(picture, sections(space, contexts)) for tag, picture in pictures.items()}
 
 
 def _errors(ax: Axes, goals: Array, errors: Array, space: Box, section: Section) -> None:
-    ax.set_title(f"{len(errors)} benchmark goals, mean error {space.amount(float(errors.mean()), '.3f')}")
+    ax.set_title(f"{len(errors)} benchmark goals, mean error {space.amount(float(errors.mean()), '.3g')}")
     least, most = (share * float(space.sides.max()) for share in SCALE)
     misses(ax, goals, errors, space, section, most, "error", least=least)
     ax.autoscale()  # limits around the goals, even in a large space

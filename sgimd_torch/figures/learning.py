@@ -12,13 +12,13 @@ import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.collections import PatchCollection, QuadMesh
-from matplotlib.colors import ListedColormap, LogNorm, Normalize
+from matplotlib.colors import FuncNorm, ListedColormap, LogNorm, Normalize
 from matplotlib.patches import Rectangle
 
 from sgimd_torch.figures.axes import alike, colour_bar, note
 from sgimd_torch.figures.names import COLOURS, NAMES
 from sgimd_torch.figures.sections import Section
-from sgimd_torch.spaces import Array, Box, rounded
+from sgimd_torch.spaces import Array, Box
 
 __all__ = ["COLOURS", "NAMES"]
 
@@ -83,7 +83,7 @@ def interest_map(
     Returns:
         Rectangles, one for each region that is shown, in the order of the regions; their array holds the interests.
     """
-    drawn = _regions_in(ax, lows, highs, interests, section, "Oranges", (0, max(float(interests.max()), 1e-6)))
+    drawn = _regions_in(ax, lows, highs, interests, section, "Oranges", Normalize(0, max(float(interests.max()), 1e-6)))
     colour_bar(ax, drawn, "interest: recent change of competence")
     ax.plot(*section.points(goals).T, ".", color="#0072b2", markersize=4, label=f"last {len(goals)} goals")
     section.frame(ax)
@@ -93,20 +93,16 @@ def interest_map(
 def competence_map(ax: Axes, lows: Array, highs: Array, competences: Array, section: Section) -> PatchCollection:
     """Regions of the interest map, coloured by mean competence, eqs. (2) and (7).
 
-    Competence is 0 if goals are met, and -1 if outcomes are no better than ``rest``. The colours span the range of the
-    competences, rounded outwards.
+    Competence is 0 if goals are met, and -1 if outcomes are no better than ``rest``. Colours go from -1 to 0, so maps
+    can be compared; they follow the square root, so good regions differ, too.
 
     Args:
         ax, lows, highs, section: arguments as for ``interest_map``.
         competences: ``(n_regions,)``; NaN for a region without goals, which stays white.
     """
-    known = competences[np.isfinite(competences)]
-    least, most = (known.min(), known.max()) if len(known) else (-1.0, 0.0)
-    step = rounded(max(most - least, 0.05) / 5)
-    low = min(np.floor(least / step) * step, -step)
-    span = low, max(np.ceil(most / step) * step, low + step)
-    drawn = _regions_in(ax, lows, highs, np.ma.masked_invalid(competences), section, "viridis", span)
-    colour_bar(ax, drawn, "competence")
+    scale = FuncNorm((lambda j: -np.sqrt(np.maximum(-j, 0)), lambda root: -np.square(root)), vmin=-1, vmax=0)
+    drawn = _regions_in(ax, lows, highs, np.ma.masked_invalid(competences), section, "viridis", scale)
+    colour_bar(ax, drawn, "competence").set_ticks([-1, -0.5, -0.2, -0.05, -0.01, 0])
     section.frame(ax)
     return drawn
 
@@ -144,7 +140,7 @@ def misses(
     norm = LogNorm(least, most) if least else Normalize(0, most)
     shown = np.maximum(errors, least)  # a logarithmic scale would leave out an error of 0
     drawn = ax.scatter(x, y, c=shown, s=14, cmap="viridis_r", norm=norm, edgecolors="none")
-    colour_bar(ax, drawn, label, extend="max")
+    colour_bar(ax, drawn, label, extend="both" if least else "max")
     section.frame(ax)
 
 
@@ -167,13 +163,13 @@ def _regions_in(
     values: Array,
     section: Section,
     colours: str,
-    limits: tuple[float, float],
+    scale: Normalize,
 ) -> PatchCollection:
     """The regions in a ``section``, coloured by ``values`` ``(n_regions,)``; a note has the place of the section."""
     if where := section.cut_at(lows, highs):
         note(ax, f"at {where}")
     lows, highs, met = section.cut(lows, highs)
     patches = [Rectangle((low[0], low[1]), *(high - low)) for low, high in zip(lows, highs, strict=True)]
-    drawn = PatchCollection(patches, cmap=colours, edgecolor="0.35", linewidth=0.8, array=values[met], clim=limits)
+    drawn = PatchCollection(patches, cmap=colours, edgecolor="0.35", linewidth=0.8, array=values[met], norm=scale)
     ax.add_collection(drawn)
     return drawn

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from sgimd_torch.figures.axes import LEGEND, alike
 from sgimd_torch.spaces import Array, Box
 
+NO_CONTEXTS: Final = Box.cube(0, 1, 0)
 _MOST_NAMED: Final = 2  # largest number of dimensions in a note; more do not fit
 
 
@@ -30,10 +31,12 @@ class Section:
     Args:
         space: T.
         dims: dimensions of T along x and y; a single dimension gives a strip along x.
+        contexts: C.
     """
 
     space: Box
     dims: tuple[int, ...]
+    contexts: Box
 
     @property
     def is_strip(self) -> bool:
@@ -80,8 +83,9 @@ class Section:
 
     def cut_at(self, lows: Array, highs: Array) -> str:
         """Text with the place of the cut, such as "z = 0.5"; "" if the picture shows all dimensions."""
-        context_dim, middle = lows.shape[1] - self.space.dim, (lows.min(axis=0) + highs.max(axis=0)) / 2
-        names = [f"context {k}" for k in range(context_dim)] + [self.space.axis(k) for k in range(self.space.dim)]
+        context_dim, middle = self.contexts.dim, (lows.min(axis=0) + highs.max(axis=0)) / 2
+        kinds = (self.contexts, "context"), (self.space, "outcome")
+        names = [box.axis(k, kind) for box, kind in kinds for k in range(box.dim)]
         hidden = [k for k in range(len(names)) if k - context_dim not in self.dims]
         if len(hidden) > _MOST_NAMED:
             return f"the middle of {len(hidden)} others"
@@ -106,8 +110,8 @@ class Section:
         )
 
 
-def sections(space: Box) -> list[Section]:
-    """The pictures of T; together they show every dimension.
+def sections(space: Box, contexts: Box = NO_CONTEXTS) -> list[Section]:
+    """The pictures of T; together they show every dimension. C, ``contexts``, has names for notes about regions.
 
     Raises:
         ValueError: T has no dimension.
@@ -115,11 +119,12 @@ def sections(space: Box) -> list[Section]:
     if space.dim == 0:
         raise ValueError("there is nothing to draw of a task space without dimensions")
     if space.dim == 1:
-        return [Section(space, (0,))]
+        return [Section(space, (0,), contexts)]
     pairs = [(k, k + 1) for k in range(0, space.dim - 1, 2)] + ([(0, space.dim - 1)] if space.dim % 2 else [])
-    return [Section(space, pair) for pair in pairs]
+    return [Section(space, pair, contexts) for pair in pairs]
 
 
-def sections_of_regions(lows: Array, highs: Array, space: Box) -> list[Section]:
+def sections_of_regions(lows: Array, highs: Array, space: Box, contexts: Box) -> list[Section]:
     """The pictures of the part of T (``space``) that regions with corners ``(n, context_dim + outcome_dim)`` cover."""
-    return sections(replace(space, low=lows.min(axis=0)[-space.dim :], high=highs.max(axis=0)[-space.dim :]))
+    low, high = lows.min(axis=0)[-space.dim :], highs.max(axis=0)[-space.dim :]
+    return sections(replace(space, low=low, high=high), contexts)

@@ -71,19 +71,10 @@ def test_limits_of_few_points_hold_all_of_them(points):
     assert box.contains(points).all()
 
 
-@pytest.mark.parametrize(
-    ("competences", "span"),
-    [
-        ((-0.7, -0.35), (-0.7, -0.3)),
-        ((-0.62, -0.38), (-0.65, -0.35)),
-        ((-0.049, -0.011), (-0.05, -0.01)),
-        ((-0.43, -0.43), (-0.43, -0.42)),
-        ((0.0, 0.0), (-0.01, 0.0)),
-        ((np.nan, np.nan), (-1.0, 0.0)),
-    ],
-)
-def test_the_colours_of_competence_span_the_competences_in_round_numbers(ax, competences, span):
-    assert competence_map(ax, LOWS, HIGHS, np.array(competences), PLANE).get_clim() == pytest.approx(span)
+def test_the_colours_of_competence_can_be_compared_and_small_misses_differ(ax):
+    drawn = competence_map(ax, LOWS, HIGHS, np.array([-0.04, -0.01]), PLANE)
+    assert drawn.get_clim() == (-1, 0)
+    assert drawn.norm(np.array([-1, -0.25, -0.04, -0.01, 0])).tolist() == pytest.approx([0, 0.5, 0.8, 0.9, 1])
 
 
 def test_regions_of_unknown_competence_are_left_white(ax):
@@ -146,16 +137,16 @@ def test_regions_are_cut_at_the_middle_of_what_is_not_shown():
     """C of 1 dimension, T of 3: four regions, cut in the context at .4 and in outcome 2 at .7."""
     lows = np.array([[0, 0, 0, 0], [0.4, 0, 0, 0], [0, 0, 0, 0.7], [0.4, 0, 0, 0.7]])
     highs = np.array([[0.4, 1, 1, 0.7], [1, 1, 1, 0.7], [0.4, 1, 1, 1], [1, 1, 1, 1]])
-    first, second = sections_of_regions(lows, highs, Box.cube(0, 1, 3))
+    first, second = sections_of_regions(lows, highs, Box.cube(0, 1, 3), Box.cube(0, 1, 1, names=("wind",), unit="m/s"))
     low, high, met = first.cut(lows, highs)
     assert met.tolist() == [False, True, False, False]
     assert (low.tolist(), high.tolist()) == ([[0.0, 0.0]], [[1.0, 1.0]])
-    assert first.cut_at(lows, highs) == "context 0 = 0.5, outcome 2 = 0.5"
+    assert first.cut_at(lows, highs) == "wind (m/s) = 0.5, outcome 2 = 0.5"
     low, high, met = second.cut(lows, highs)
     assert met.tolist() == [False, True, False, True]
     assert (low.tolist(), high.tolist()) == ([[0.0, 0.0], [0.0, 0.7]], [[1.0, 0.7], [1.0, 1.0]])
-    assert second.cut_at(lows, highs) == "context 0 = 0.5, outcome 1 = 0.5"
-    (plane, *_) = sections_of_regions(np.zeros((1, 7)), np.ones((1, 7)), Box.cube(0, 1, 6))
+    assert second.cut_at(lows, highs) == "wind (m/s) = 0.5, outcome 1 = 0.5"
+    (plane, *_) = sections_of_regions(np.zeros((1, 7)), np.ones((1, 7)), Box.cube(0, 1, 6), Box.cube(0, 1, 1))
     assert plane.cut_at(np.zeros((1, 7)), np.ones((1, 7))) == "the middle of 5 others"
 
 
@@ -169,7 +160,7 @@ def test_the_regions_of_an_interest_map_tile_each_picture_and_have_their_interes
     lows, highs = (np.stack([getattr(region, end) for region in goals.regions]) for end in ("low", "high"))
     interests = np.array([region.interest() for region in goals.regions])
     assert len(lows) > 4
-    for section in sections_of_regions(lows, highs, space):
+    for section in sections_of_regions(lows, highs, space, contexts):
         low, high, met = section.cut(lows, highs)
         drawn = interest_map(Figure().subplots(), lows, highs, interests, section, goals=goals.regions[0].goals)
         corners = np.stack([path.vertices for path in drawn.get_paths()])

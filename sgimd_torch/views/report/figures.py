@@ -192,7 +192,7 @@ def regions(figure: Figure, run: Run) -> None:
     """The regions of T at the last evaluation, coloured by interest, with the latest goals."""
     assert run.regions is not None
     lows, highs, interests = map_after(run.regions, run.regions["movements"].max())
-    panels = sections_of_regions(lows, highs, run.spaces["outcomes"])
+    panels = sections_of_regions(lows, highs, run.spaces["outcomes"], run.spaces["contexts"])
     for ax, section in zip(_panels(figure, panels), panels, strict=True):
         interest_map(ax, lows, highs, interests, section, goals=run.chosen_goals()[-GOALS:])
 
