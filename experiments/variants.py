@@ -115,6 +115,7 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
         "sgim-d": {**SGIM_D, **WHOLE, **FLOOR},
     },
     "letter": {
+        "random-letter": {"algorithm": "random", **INVERSE, **WHOLE},
         "sagg-riac-letter": {**SAGG_RIAC_LETTER, **WHOLE},
         "observation-letter": {"algorithm": "observation", **INVERSE, **WHOLE},
         "imitation-letter": {"algorithm": "imitation", **INVERSE, **WHOLE},
