@@ -77,7 +77,7 @@ def paper(evidence: Evidence, *, letter: bool) -> list[Claim]:
         Claim("... about as large as that of SAGG-RIAC: ratio 0.80 to 1.25",
               [at_most(1.25, evidence.ratio, imitation, sagg_riac),
                at_least(0.8, evidence.ratio, imitation, sagg_riac)],
-              "One of both alone is not enough."),
+              "Either alone helps about as much."),
         Claim("... and varies less over seeds: ratio of variances ≤ 0.50",
               [at_most(0.5, evidence.variance_ratio, imitation, sagg_riac)], "A teacher makes seeds more alike."),
         Claim("SGIM-D has the smallest error: probability of improvement over each of the four others ≥ 0.95, "
