@@ -2,6 +2,7 @@
 
 A local Gaussian process is fitted to a hundred movements and asked about some fifty candidates, by arrays so small that
 calls of numpy would take ten times as long as their arithmetic. Compiled functions release Python's lock.
+Loops write rows, because for a row assignment numba compiles the text of an error, which takes 1.6 s.
 Import this module through `compiled`: loading numba takes half a second.
 """
 

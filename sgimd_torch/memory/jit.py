@@ -47,8 +47,8 @@ def as_columns(table: Array, rows: np.ndarray) -> Array:
 
 @jit_helper
 def factorised(matrix: Array, ridge: float) -> Array:
-    """Cholesky factor ``(n, n)`` of the symmetric ``matrix`` plus ``ridge`` on its diagonal; the lower halves count.
-    Compiling `np.linalg.cholesky` and `np.linalg.solve` would take five seconds."""
+    """Cholesky factor ``(n, n)`` of the symmetric ``matrix`` plus ``ridge`` on its diagonal; the lower halves count. To
+    compile `np.linalg.solve` numba takes up to 2.6 s, in each module anew."""
     factor = np.zeros(matrix.shape)
     for i in range(len(matrix)):
         for j in range(i + 1):
