@@ -122,22 +122,29 @@ def loading() -> AbstractContextManager[None]:
 @contextmanager
 def _on_signals(handler: Callable[[int, FrameType | None], object]) -> Iterator[None]:
     """A block in which ``handler`` gets SIGINT and SIGTERM. In another thread than the main one nothing changes."""
-    owner = os.getpid()
-
-    def handle(signum: int, frame: FrameType | None) -> None:
-        if os.getpid() == owner:
-            handler(signum, frame)
-        elif signum != signal.SIGINT:  # a forked worker ends; Ctrl-C is for the owner, who waits for its workers
-            signal.signal(signum, signal.SIG_DFL)
-            os.kill(os.getpid(), signum)
-
     heard = SIGNALS if threading.current_thread() is threading.main_thread() else ()
-    before = {signum: signal.signal(signum, handle) for signum in heard}
+    before = {signum: signal.signal(signum, handler) for signum in heard}
     try:
         yield
     finally:
         for signum, earlier in before.items():
             signal.signal(signum, earlier)
+
+
+def _in_forked_worker() -> None:
+    """A worker that is forked in such a block ends at SIGTERM, at once even where it waits: there a handler of Python
+    might never run. Ctrl-C is for the owner, who waits for its workers."""
+    for signum, action in ((signal.SIGINT, lambda *_: None), (signal.SIGTERM, signal.SIG_DFL)):
+        if getattr(signal.getsignal(signum), "__module__", None) == __name__:
+            signal.signal(signum, action)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
+
+
+os.register_at_fork(  # a signal that arrives while a worker is forked waits until the worker is ready for it
+    before=partial(signal.pthread_sigmask, signal.SIG_BLOCK, SIGNALS),
+    after_in_parent=partial(signal.pthread_sigmask, signal.SIG_UNBLOCK, SIGNALS),
+    after_in_child=_in_forked_worker,
+)
 
 
 def _end(signum: int, frame: FrameType | None) -> None:

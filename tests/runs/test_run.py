@@ -114,6 +114,9 @@ with Stopping():
     print(pool.map(abs, range(4)))
     pool.terminate()
     pool.join()
+    for _ in range(20):
+        with multiprocessing.get_context("fork").Pool(2):
+            pass  # its workers are ended while they begin
 """
 
 
