@@ -107,6 +107,10 @@ class Page:
         older = [f"{share:.0%} of `{name}`".replace("%", " %") for name, share in shares.items() if share]
         return f"**{'All rows' if min(shares.values()) == 1 else ', '.join(older)}: made by an earlier version.**"
 
+    def made_earlier(self, *variants: str) -> bool:
+        """Whether an earlier version has made rows of these variants."""
+        return bool((self.evidence.of_variants(variants) != LEARNING).any())
+
     def ratio(self, ours: str, theirs: str, at: int = LAST) -> str:
         """Our error divided by theirs, with the interval of this ratio."""
         return self.cell(self.evidence.ratio, ours, theirs, at, form=".2f", between=True)

@@ -10,12 +10,12 @@ from collections.abc import Generator
 
 import numpy as np
 
-from sgimd_torch.parts import Problem, Search
-from sgimd_torch.searches.vary import positive
+from sgimd_torch.parts import Problem
+from sgimd_torch.searches.vary import Vary
 from sgimd_torch.spaces import Array, Estimate
 
 
-class Perturb(Search):
+class Perturb(Vary):
     """Best movement so far plus Gaussian noise.
 
     The best movement is one of the exemplars of the estimate, or a movement of this search. theta_g is executed first,
@@ -31,24 +31,19 @@ class Perturb(Search):
     """
 
     def __init__(self, problem: Problem, *, sd: float = 0.05) -> None:
-        super().__init__(problem)
-        self.sd = positive(sd)
+        super().__init__(problem, sd=sd)
 
     def __call__(self, start: Estimate, goal: Array) -> Generator[Array, Array, None]:
         """Movements around ``start``."""
         distances = np.linalg.norm(start.outcomes - goal, axis=1)
         best, shortest = start.thetas[distances.argmin()], float(distances.min())
         policies = self.problem.policies
-        theta = self._vary(best) if _remembered(start) else policies.check("theta of the estimate", start.theta)
+        theta = self.varied(best) if _remembered(start) else policies.check("theta of the estimate", start.theta)
         while True:
             distance = math.dist(goal, (yield theta))
             if distance < shortest:
                 best, shortest = theta, distance
-            theta = self._vary(best)
-
-    def _vary(self, theta: Array) -> Array:
-        policies = self.problem.policies
-        return policies.clip(self.rng.normal(theta, self.sd * policies.sides))
+            theta = self.varied(best)
 
 
 def _remembered(start: Estimate) -> bool:

@@ -30,17 +30,17 @@ class Vary(Search):
 
     def __init__(self, problem: Problem, *, sd: float = 0.03) -> None:
         super().__init__(problem)
-        self.sd = positive(sd)
+        if not sd > 0:
+            raise ValueError(f"sd must be positive, got {sd}; without noise nothing new is tried")
+        self.sd = sd
 
     def __call__(self, start: Estimate, goal: Array) -> Generator[Array, Array, None]:
         """Movements around theta_g of ``start``."""
-        policies = self.problem.policies
-        theta = policies.check("theta of the estimate", start.theta)
+        theta = self.problem.policies.check("theta of the estimate", start.theta)
         while True:
-            yield policies.clip(self.rng.normal(theta, self.sd * policies.sides))
+            yield self.varied(theta)
 
-
-def positive(sd: float) -> float:
-    if not sd > 0:
-        raise ValueError(f"sd must be positive, got {sd}; without noise nothing new is tried")
-    return sd
+    def varied(self, theta: Array) -> Array:
+        """``theta`` plus noise, clipped to Pi."""
+        policies = self.problem.policies
+        return policies.clip(self.rng.normal(theta, self.sd * policies.sides))

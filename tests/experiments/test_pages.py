@@ -110,7 +110,10 @@ def test_a_page_names_the_groups_whose_rows_are_not_all_of_this_learning(tmp_pat
     said = "**75 % of `paper`, 100 % of `letter`: made by an earlier version.**"
     assert page.older("paper", "letter", "large", "robots") == said
     assert page.older("letter") == "**All rows: made by an earlier version.**"
-    assert Page(Evidence.of(write(tmp_path, rows[:1])), tmp_path).older("paper") == ""
+    assert page.made_earlier("sgim-d-letter")
+    page = Page(Evidence.of(write(tmp_path, rows[:1])), tmp_path)
+    assert page.older("paper") == ""
+    assert not page.made_earlier("random")
 
 
 def test_what_was_not_run_is_left_out_of_a_table_and_named(tmp_path):
