@@ -85,11 +85,13 @@ board: goals met within a whole tile | board/listener.py | board/test_board.py
 index: contexts do not count | memory/__init__.py | memory/test_memory.py
     np.concatenate((contexts, outcomes), axis=1) ==> np.concatenate((0 * contexts, outcomes), axis=1)
 index: of equally near exemplars the newest first | memory/scan.py | memory/test_memory.py
-    squared[position - 1] > distance ==> squared[position - 1] >= distance
+    distances[position - 1] > distance ==> distances[position - 1] >= distance
 index: the radius is squared once | memory/neighbours.py | memory/test_memory.py
     np.where(squared <= within * within, rows, -1) ==> np.where(squared <= within, rows, -1)
 index: a list misses the first new row | memory/neighbours.py | memory/test_neighbours.py
-    keys[rows], self._compared[rows], rows ==> keys[rows], self._compared[rows] + 1, rows
+    *_NO_SINGLES, self._compared[rows], rows ==> *_NO_SINGLES, self._compared[rows] + 1, rows
+index: a query that is asked again misses the first new row | memory/neighbours.py | memory/test_neighbours.py
+    np.array([compared]) ==> np.array([compared + 1])
 gross errors: precisions keep what they were | inverses/kernels.py | inverses/test_local_process.py
     precision[j] -= shrinking * column[j] ** 2 ==> precision[j] -= 0 * column[j]
 a Gaussian process with another kernel | inverses/kernels.py | inverses/test_local_process.py

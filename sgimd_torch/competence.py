@@ -49,22 +49,13 @@ class Competence(Judge):
     nearest exemplar in (context, outcome) is used instead.
     """
 
-    def __init__(self, problem: Problem) -> None:
-        super().__init__(problem)
-        self._asked: tuple[bytes, bytes, int] | None = None
-
     def __call__(self, context: Array, goal: Array, outcomes: Array | None = None) -> float:
         """Competence in [-1, 0], -1 for an empty memory; ``outcomes`` is not used, as they are in memory already."""
-        memory = self.problem.memory
+        problem, memory = self.problem, self.problem.memory
         if not len(memory):
             return -1.0
-        asked = context.tobytes(), goal.tobytes(), len(memory)
-        if asked != self._asked:
-            # `performance` without its general shapes, as each movement asks for it
-            missed = float(_distance(goal, memory.outcomes[memory.near_outcomes(context, goal, 1)[0]]))
-            far = max(float(_distance(goal, self.problem.rest)), self.problem.tolerance)
-            self._asked, self._best = asked, -min(1.0, missed / far)
-        return self._best
+        nearest = memory.outcomes[memory.near_outcomes(context, goal, 1)[0]]
+        return float(performance(goal, nearest, problem.rest, problem.tolerance))
 
 
 class AttemptCompetence(Judge):

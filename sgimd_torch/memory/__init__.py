@@ -95,7 +95,7 @@ class Memory:
         """Rows ``(min(k, n),)`` whose contexts and outcomes lie nearest to ``context`` and ``goal`` ``(outcome_dim,)``,
         nearest first; of equally near rows, the oldest first."""
         goal = check_point("goal", goal, self.outcome_dim, "was a theta passed instead?")
-        return self._by_outcome.nearest(self._key(context, goal)[None], k)[0]
+        return self._by_outcome.nearest_to(self._key(context, goal), k)
 
     def near_policies(self, context: ArrayLike, theta: ArrayLike, k: int, within: float = np.inf) -> Rows:
         """At most ``k`` rows whose contexts and thetas lie nearest to ``context`` and ``theta`` ``(theta_dim,)``, not

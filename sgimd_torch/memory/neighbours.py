@@ -27,6 +27,8 @@ EXACT_UP_TO: Final = 10**5  # largest number of rows for which neighbours are ex
 LISTED: Final = 20  # number of neighbours in the list of a row
 _SPARE: Final = 8  # number of rows beyond k that cells propose
 _FARTHEST: Final = 1e15  # largest coordinate in single precision, so that squared distances do not overflow
+_NO_SINGLES: Final = 2 * (np.empty((0, 0), np.float32),)  # no queries and distances in single precision
+_FIRST: Final = np.zeros(1, np.int64)  # index of the only list
 _FAST_DIMS: Final = 1, 2, 4, 8, 12  # dimensions in which faiss is several times faster; points get zeros up to these
 
 faiss.omp_set_num_threads(1)  # queries last microseconds, and waking threads costs more than it saves
@@ -45,6 +47,7 @@ class Neighbours:
         # For each row the list of its nearest rows, their squared distances, and the number of rows compared so far.
         self._rows, self._squared = np.empty((0, LISTED), np.int64), np.empty((0, LISTED))
         self._compared = np.empty(0, np.int64)
+        self._last = b"", self._rows, self._squared, 0  # last single query, its list, and the number of rows compared
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Neighbours, (self.keys,)
@@ -59,6 +62,21 @@ class Neighbours:
         rows, squared = self._search(queries, k)
         return np.where(squared <= within * within, rows, -1)
 
+    def nearest_to(self, query: Array, k: int) -> Rows:
+        """Result of `nearest` for one ``query`` ``(dim,)``; if it is asked again, only newer rows are compared.
+
+        Raises:
+            ValueError: ``k`` is below 1.
+        """
+        n, (last_query, rows, squared, compared), key = len(self.keys), self._last, query.tobytes()
+        if last_query != key or rows.shape[1] < min(n, max(k, LISTED)) or not 1 <= k <= n <= EXACT_UP_TO:
+            rows, squared = self._search(query[None], max(k, LISTED) if 1 <= k <= n <= EXACT_UP_TO else k)
+        elif compared < n:
+            rows, squared = rows.copy(), squared.copy()
+            _scan().extend(self.keys.rows, query[None], *_NO_SINGLES, np.array([compared]), _FIRST, rows, squared)
+        self._last = key, rows, squared, n
+        return rows[0, :k]
+
     def around(self, rows: Rows, k: int, within: float = math.inf) -> Rows:
         """Result of `nearest` for each of ``rows``, from lists that are kept: only newer rows are compared.
 
@@ -70,16 +88,15 @@ class Neighbours:
             return self.nearest(keys[rows], k, within)
         with self._lock:
             if n > len(self._compared):
-                old, size = (self._rows, self._squared, self._compared), 2 * n
-                self._rows, self._squared = np.empty((size, LISTED), np.int64), np.empty((size, LISTED))
-                self._compared = np.zeros(size, np.int64)
-                for new, kept in zip((self._rows, self._squared, self._compared), old, strict=True):
-                    new[: len(kept)] = kept
+                size = 2 * n - len(self._compared)
+                self._rows = np.concatenate((self._rows, np.empty((size, LISTED), np.int64)))
+                self._squared = np.concatenate((self._squared, np.empty((size, LISTED))))
+                self._compared = np.concatenate((self._compared, np.zeros(size, np.int64)))
             new = rows[self._compared[rows] == 0]
             if len(new):
                 self._rows[new], self._squared[new] = self._search(keys[new], LISTED)
                 self._compared[new] = n
-            _scan().extend(keys, keys[rows], self._compared[rows], rows, self._rows, self._squared)
+            _scan().extend(keys, keys[rows], *_NO_SINGLES, self._compared[rows], rows, self._rows, self._squared)
             self._compared[rows] = n
             return np.where(self._squared[rows, :k] <= within * within, self._rows[rows, :k], -1)
 
@@ -102,7 +119,7 @@ class Neighbours:
         for point, row in zip(single_queries, distances, strict=True):
             pointers = faiss.swig_ptr(row), faiss.swig_ptr(point), vectors
             faiss.fvec_L2sqr_ny(*pointers, self._width, n)  # type: ignore[attr-defined]
-        return _scan().nearest(keys, queries, single_queries, distances, min(k, n))
+        return _nearest(keys, queries, single_queries, distances, min(k, n))
 
     def _search_cells(self, query: Array, point: Single, k: int) -> tuple[Rows, Array]:
         """Result of `_search` for one query, among the rows that the index of cells proposes."""
@@ -110,8 +127,7 @@ class Neighbours:
         proposed.sort()
         if proposed[0] < 0:  # the cells are nearly empty
             proposed = np.arange(len(self.keys))
-        distances = np.zeros((1, len(proposed)), np.float32)  # nothing is ruled out
-        positions, squared = _scan().nearest(self.keys.rows[proposed], query, point, distances, k)
+        positions, squared = _nearest(self.keys.rows[proposed], query, *_NO_SINGLES, k)
         return proposed[positions], squared
 
     def _add_new_rows(self) -> None:
@@ -130,6 +146,14 @@ class Neighbours:
         single = np.zeros((len(points), self._width), np.float32)
         single[:, : self.keys.dim] = np.minimum(np.maximum(points - self.keys.rows[:1], -_FARTHEST), _FARTHEST)
         return single
+
+
+def _nearest(keys: Array, queries: Array, single_queries: Single, singles: Single, k: int) -> tuple[Rows, Array]:
+    """The ``(m, k)`` rows of ``keys`` nearest to ``queries``, and their squared distances; see `scan.extend`."""
+    m = len(queries)
+    rows, squared = np.full((m, k), -1), np.full((m, k), np.inf)
+    _scan().extend(keys, queries, single_queries, singles, np.zeros(m, np.int64), np.arange(m), rows, squared)
+    return rows, squared
 
 
 def _scan() -> Any:

@@ -43,4 +43,5 @@ class Vary(Search):
     def varied(self, theta: Array) -> Array:
         """``theta`` plus noise, clipped to Pi."""
         policies = self.problem.policies
-        return policies.clip(self.rng.normal(theta, self.sd * policies.sides))
+        noise = self.sd * policies.sides * self.rng.standard_normal(policies.dim)  # a third of the time of rng.normal
+        return policies.clip(theta + noise)

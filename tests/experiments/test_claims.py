@@ -18,6 +18,7 @@ PAGES = {
     "any_robot": robots.any_robot,
     "changes": robots.changes,
 }
+pytestmark = pytest.mark.usefixtures("few_draws")
 
 
 PAPER = {  # the number of a claim of the paper: changes each of which makes it wrong

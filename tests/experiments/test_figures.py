@@ -13,6 +13,7 @@ from sgimd_torch.figures.learning import COLOURS, NAMES
 from sgimd_torch.runs.signals import command
 
 NOT_MADE_UP = ("middle", "middle-process")
+pytestmark = pytest.mark.usefixtures("few_draws")
 
 
 @pytest.fixture(scope="module")

@@ -116,6 +116,7 @@ def test_a_page_names_the_groups_whose_rows_are_not_all_of_this_learning(tmp_pat
     assert not page.made_earlier("random")
 
 
+@pytest.mark.usefixtures("few_draws")
 def test_what_was_not_run_is_left_out_of_a_table_and_named(tmp_path):
     found = Evidence.of(write_rows(tmp_path, without=["practice-interest"]))
     text, page = filled("LEARNING", found, tmp_path)

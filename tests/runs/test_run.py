@@ -50,12 +50,12 @@ def test_every_choice_runs_and_differs_from_the_others(tmp_path, go, kind, table
     logs = set()
     option = {"progress": "goals.progress", "choose": "teacher.choose"}.get(kind, kind)
     # Short attempts and a short window, so that the map is split, and has its say, before the run is over.
-    common = ["--movements", 240, "--evaluate_at", "[]", "--environment", "planar-arm-7", "--benchmark", "null"]
+    common = ["--evaluate_at", "[]", "--environment", "planar-arm-7", "--benchmark", "null"]
+    common += ["--movements", 240 if kind in ("goals", "progress") else 120]
     common += ["--algorithm", "sgim-im"] if kind == "teachers" else ["--budget", 3]
     common += ["--teacher.every", 20] if kind == "choose" else []
     common += ["--goals.window", 4] if kind == "progress" else []
     common += ["--environment", "fishing-rod"] if kind in ("teachers", "judge") else []
-    common += ["--movements", 120] if kind == "teachers" else []
     # Models have test_run_model.py; a person who is not there is like no teacher, and demonstrator 3 is all there are.
     left_out = "gradient", "gradient-then-nelder-mead", "model", "model-alone", "by-hand", "demonstrator-3"
     choices = [choice for choice in table if choice not in left_out]

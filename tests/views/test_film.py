@@ -316,7 +316,7 @@ ARM_OF_GREY = """<mujoco><worldbody>{}<body><joint name='turn' axis='0 0 1' rang
 def test_an_arm_of_any_brightness_stands_out_from_what_is_behind_it(tmp_path):
     paths = []
     for around in ("", "<geom type='plane' size='.1 .1 .1'/>", "<light pos='0 0 2'/>"):
-        for grey in (0.05, 0.6, 1.0):
+        for grey in (0.05, 0.8):
             paths.append(tmp_path / f"{len(paths)}.xml")
             paths[-1].write_text(ARM_OF_GREY.format(around, grey, grey, grey))
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "MUJOCO_GL": "egl"}
