@@ -96,7 +96,7 @@ class BoardListener(EventFile):
         folder: Path,
         parts: Any,
         seconds: Callable[[], Mapping[str, float]],
-        curves: Callable[[], Mapping[str, float]] = dict,
+        curves: Callable[[], Mapping[str, float]],
     ) -> None:
         super().__init__(folder)
         self._config, self._learner, self._seconds, self._curves = parts.config, parts.learner, seconds, curves

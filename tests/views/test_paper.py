@@ -14,7 +14,7 @@ from PIL import Image
 
 from pages import Page, rows_of
 from runs import write_about
-from sgimd_torch.figures.learning import COLOURS
+from sgimd_torch.figures.names import COLOURS
 from sgimd_torch.options.command_line import main as live
 from sgimd_torch.options.config import words
 from sgimd_torch.runs.read import read_run

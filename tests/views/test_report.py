@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from pages import Page, rows_of
-from sgimd_torch.figures.learning import COLOURS
+from sgimd_torch.figures.names import COLOURS
 from sgimd_torch.options.command_line import parse
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.spaces import Box

@@ -22,7 +22,7 @@ from matplotlib.patches import Rectangle
 from PIL import Image
 
 from sgimd_torch.environments.sketch import Sketch
-from sgimd_torch.figures.axes import goal_rings, limits, over_movements
+from sgimd_torch.figures.axes import limits, over_movements
 from sgimd_torch.figures.learning import misses
 from sgimd_torch.figures.save import STYLE
 from sgimd_torch.figures.sections import sections
@@ -39,6 +39,7 @@ PATH: Final = "#e08a55"  # colour of the path of a chain's end
 END: Final = "#d1341f"  # colour of a chain's end, and of the outcome
 OBJECT: Final = "#2f7f6f"  # colour of an object
 PAST: Final = "#9db4c8"  # colour of past outcomes
+GOAL: Final = "#f0e442"  # colour of the goal's ring, which has a black edge
 
 
 class Sketchbook:
@@ -74,7 +75,8 @@ class Sketchbook:
         if self._space.dim > 1:
             ax.add_patch(Rectangle(self._space.low[:2], *self._space.sides[:2], fill=False, edgecolor=BORDER))  # type: ignore[arg-type]
         ax.plot(*in_picture(shot.past).T, "o", color=PAST, ms=2, mec="none")
-        goal_rings(ax, in_picture(shot.goal[None]), 14)
+        for edge, width in (("black", 4.5), (GOAL, 2.5)):
+            ax.plot(*in_picture(shot.goal[None]).T, "o", mfc="none", mec=edge, ms=14, mew=width)
         for chain in sketch.chains:
             ax.plot(*chain[: last + 1, -1].T, color=PATH, lw=1.5)
         for chain in sketch.chains:

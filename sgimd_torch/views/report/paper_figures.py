@@ -78,8 +78,7 @@ def outcomes(figure: Figure, study: Replication) -> None:
         for ax, run in zip(axes[:, column], variant.runs[:n], strict=True):
             landed = run.outcomes[plane.contains(run.outcomes)]
             shown = np.array([demonstration.outcome for demonstration in run.demonstrations])
-            crosses = shown if len(shown) else None
-            meshes.append(landing_points(ax, landed, plane, section, demonstrated=crosses, side=TILE))
+            meshes.append(landing_points(ax, landed, plane, section, demonstrated=shown, side=TILE))
             ax.set_title(f"{NAMES[name]}, seed {run.config['seed']}", pad=22)  # above the legend
             ax.label_outer()
     most, bars = max(float(mesh.get_clim()[1]) for mesh in meshes), [mesh.colorbar for mesh in meshes if mesh.colorbar]
