@@ -1,4 +1,4 @@
-"""Figures as files, all in one style and one resolution; equal data give equal files.
+"""Figures as files, all in one style and one resolution, or as pixels; equal data give equal files.
 
 save_figure(lambda: errors(data), Path("results/figures/errors.svg"))
 """
@@ -10,8 +10,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
 from matplotlib import rc_context
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from sgimd_torch.files import write_bytes
 
@@ -38,3 +41,10 @@ def save_figure(draw: Callable[[], Figure], path: Path) -> None:
     with rc_context(STYLE):
         draw().savefig(content, format=kind, dpi=DPI, metadata={"Date": None} if kind == "svg" else {})
     write_bytes(path, content.getvalue())
+
+
+def pixels(figure: Figure) -> NDArray[np.uint8]:
+    """The drawing of a figure, ``(height, width, 4)``: red, green, blue and opacity."""
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba())

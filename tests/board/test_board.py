@@ -18,10 +18,9 @@ from own import MODULE
 from runs import content_of
 from sgimd_torch import InterestMap, stream
 from sgimd_torch.board import pictures
-from sgimd_torch.board.curves import Behaviour, branches, evaluation_curves, region_curves
+from sgimd_torch.board.curves import Behaviour, OwnRegions, branches, evaluation_curves, region_curves
 from sgimd_torch.board.legend import LEGEND
 from sgimd_torch.board.listener import EventFile
-from sgimd_torch.board.own_regions import OwnRegions
 from sgimd_torch.competence import performance
 from sgimd_torch.evaluation import Evaluation
 from sgimd_torch.figures.sections import sections

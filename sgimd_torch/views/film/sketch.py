@@ -16,7 +16,6 @@ from typing import Any, Final
 
 import numpy as np
 from matplotlib import rc_context
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from PIL import Image
@@ -24,7 +23,7 @@ from PIL import Image
 from sgimd_torch.environments.sketch import Sketch
 from sgimd_torch.figures.axes import limits, over_movements
 from sgimd_torch.figures.learning import misses
-from sgimd_torch.figures.save import STYLE
+from sgimd_torch.figures.save import STYLE, pixels
 from sgimd_torch.figures.sections import sections
 from sgimd_torch.spaces import Array, Box, rounded
 from sgimd_torch.views.film.reel import HEIGHT, WIDTH, Frame, Shot
@@ -84,7 +83,7 @@ class Sketchbook:
             ax.plot(*chain[last, -1:].T, "o", color=OBJECT if chain.shape[1] == 1 else END, ms=7)
         if time >= sketch.landed:
             ax.plot(*in_picture(sketch.outcome[None]).T, "x", color=END, ms=12, mew=2)
-        return Image.fromarray(pixels(self._figure))
+        return Image.fromarray(pixels(self._figure)[..., :3])
 
 
 def in_picture(points: Array) -> Array:
@@ -121,16 +120,9 @@ def panel(space: Box, goals: Array, errors: Array, now: int, curve: tuple[Array,
         below.plot(movements[seen], means[seen], "o-", color=colour, ms=4)
         over_movements(below, space.in_unit("mean error"))
         below.set(xlim=(0, 1.05 * float(movements.max())), ylim=(0, 1.1 * float(means.max()) or 1.0))
-        return pixels(figure)
+        return pixels(figure)[..., :3]
 
 
 def blank(width: float, **options: Any) -> Figure:
     """A figure with a width in pixels and the height of the film; ``options`` go to matplotlib."""
     return Figure(figsize=(width / DPI, HEIGHT / DPI), dpi=DPI, **options)
-
-
-def pixels(figure: Figure) -> Frame:
-    """The drawing of a figure as a frame."""
-    canvas: Any = FigureCanvasAgg(figure)
-    canvas.draw()
-    return np.array(canvas.buffer_rgba())[..., :3]
