@@ -86,10 +86,10 @@ def test_about_as_many_goals_as_wanted_are_made_also_where_little_of_a_large_spa
 @pytest.mark.parametrize(
     ("movements", "spread", "tiles", "limit"),
     [
-        (4000, 1.0, 20, "no tiles are larger than 0.2"),
-        (4000, 0.15, 200, "no tiles are smaller than 0.05"),  # what is reached has room for 49 of them
+        (1000, 1.0, 20, "no tiles are larger than 0.4"),
+        (1000, 0.15, 200, "no tiles are smaller than 0.1"),  # what is reached has room for 49 of them
         (60, 1.0, 358, "tiles smaller than "),  # of 60 movements, hardly two land on one tile
-        (4000, 1.0, 200, ""),
+        (1000, 1.0, 200, ""),
     ],
 )
 def test_what_limits_the_number_of_goals_is_said(own, module, capsys, movements, spread, tiles, limit):
@@ -103,18 +103,11 @@ def test_what_limits_the_number_of_goals_is_said(own, module, capsys, movements,
 
 
 SPREAD = """
-import numpy as np
-from sgimd_torch import Box
+from sliders import *
 
-class Spread:
-    contexts, policies, outcomes = Box.cube(0, 1, 0), Box.cube(0, 1, 2), Box.cube(-1, 1, 2)
-    rest, outcome_noise = np.zeros(2), 0.0
-
-    def observe(self, rng):
-        return np.zeros(0)
-
+class Spread(Slider2):
     def execute(self, context, theta, rng):
-        return {spread} * (2 * theta - 1)
+        return 1 + 2 * {spread} * (2 * theta - 1)  # around the middle of T, whose sides are 4
 """
 
 
