@@ -12,7 +12,7 @@ from markupsafe import escape
 from matplotlib.figure import Figure
 from PIL import Image
 
-from pages import Page, rows_of
+from pages import Page, alts, drawn, rows_of
 from sgimd_torch.figures.names import COLOURS
 from sgimd_torch.options.command_line import parse
 from sgimd_torch.runs.read import read_run
@@ -51,16 +51,6 @@ def pages(runs, tmp_path_factory):
     assert report.main([str(runs), "--out", str(out / "many.html")]) == 0
     assert report.main([str(runs / "sgim-d" / "seed-003"), "--out", str(out / "one.html")]) == 0
     return {name: (out / f"{name}.html").read_text(encoding="utf-8") for name in ("many", "one")}
-
-
-def drawn(draw, *args):
-    """The figure that a function of the page draws."""
-    draw.__wrapped__(figure := Figure(), *args)
-    return figure
-
-
-def alts(text):
-    return [given["alt"] for name, given in Page(text).elements if name == "img"]
 
 
 @pytest.mark.parametrize("name", ["many", "one"])
