@@ -23,7 +23,6 @@ from sgimd_torch.views.report import paper, paper_figures
 from sgimd_torch.views.report.replication import Replication
 from sgimd_torch.views.variants import Variant
 
-FIVE = ["Random", "SAGG-RIAC", "Observation", "Imitation", "SGIM-D"]
 FIGURES = [
     *("Error curves of the five learners", "Error curves by demonstrator"),
     "Histograms of outcomes of Random, SAGG-RIAC and SGIM-D",
