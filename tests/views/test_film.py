@@ -18,7 +18,6 @@ from sgimd_torch.environments.sketch import Sketch
 from sgimd_torch.options import command_line
 from sgimd_torch.runs.signals import command
 from sgimd_torch.spaces import Box, stream
-from sgimd_torch.views import check
 from sgimd_torch.views.film import command as film
 from sgimd_torch.views.film.model_camera import viewing
 from sgimd_torch.views.film.reel import PAUSE, RATES, Shot, write_film
@@ -369,21 +368,6 @@ def test_a_picture_of_ones_own_is_filmed_for_outcomes_of_any_dimension(own, word
     assert command(film.main, f"{run} --trust --out one.webp --goals {goal}".split()) == 0
     with Image.open("one.webp") as moving:
         assert moving.size == (640 + 360, 480)
-
-
-@pytest.mark.parametrize(
-    ("word", "code", "message"),
-    [
-        ("sliders:Slider", 0, ""),
-        ("fishing-rod", 0, ""),
-        ("sliders:StillPicture", 2, "trace() of StillPicture ends at [0.0], execute() with an equal stream at ["),
-        ("sliders:OtherPicture", 2, "OtherPicture must give a Sketch with an outcome of 1 dimension, got one of 2"),
-        ("sliders:LostPicture", 2, "trace() of LostPicture failed: KeyError: 'where'"),
-    ],
-)
-def test_the_check_of_an_environment_looks_at_its_picture(own, capsys, word, code, message):
-    assert command(check.main, [word]) == code
-    assert message in capsys.readouterr().err
 
 
 def test_code_that_somebody_elses_run_names_is_executed_only_with_trust(own, capsys, monkeypatch):
