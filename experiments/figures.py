@@ -43,7 +43,6 @@ with loading():  # Ctrl-C shows no traceback
     from sgimd_torch.files import make_folder
     from sgimd_torch.views.statistics import Interval, bootstrap_rng, iqm_interval
 
-KIND: Final = "svg"
 ERROR: Final = "mean distance to the goals (m)"
 LEARNERS: Final = ("random", "sagg-riac", "observation", "imitation", "sgim-d")  # learners of the paper
 
@@ -178,7 +177,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     make_folder(options.out)
     for name in FIGURES if options.only is None else [options.only]:
         try:
-            print(*save_figure(partial(FIGURES[name], evidence), options.out / name, KIND))
+            save_figure(partial(FIGURES[name], evidence), path := options.out / f"{name}.svg")
+            print(path)
         except NotRun as missing:
             say(f"{name} is left out; not run: {missing}")
     return 0

@@ -2,21 +2,26 @@
 
 Section 3.2.1 of Nguyen & Oudeyer (2014) defines interest and competence of a region.
     behaviour = Behaviour(0.02); behaviour.episode(episode); behaviour.curves(); region_curves(interest_map.regions)
+    own = OwnRegions(problem); own.follow(behaviour); region_curves(own.regions)
 """
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Final
 
 import numpy as np
 
 from sgimd_torch.evaluation import Evaluation, OwnGoals
-from sgimd_torch.goals.regions import Region
+from sgimd_torch.goals.regions import Region, Tiling, absolute_progress, interest_of
+from sgimd_torch.parts import Problem
 from sgimd_torch.spaces import Array, Episode
 
 DEPTH: Final = 3  # levels of the tree of regions, below its root, that have curves; so at most 15 regions have them
+MOST: Final = 40  # largest number of goals in an own region; with more, it is cut, or forgets the oldest quarter
+INTEREST: Final = partial(interest_of, window=24, progress=absolute_progress)  # eq. (3), of own regions
 
 
 class Behaviour:
@@ -108,3 +113,49 @@ def branches(regions: Sequence[Region]) -> Mapping[str, list[Region]]:
         for length in range(1, min(len(path), DEPTH + 1) + 1):
             leaves_below.setdefault(path[:length], []).append(region)
     return dict(sorted(leaves_below.items()))
+
+
+class OwnRegions:
+    """Regions of C x T for a learner whose goal model has none, such as practice; the board makes them for its own use.
+
+    They tile C x T and remember their latest goals. They are those of section 3.2.1, eqs. (3) and (7), but cut at
+    medians. Nothing is drawn at random.
+
+    Args:
+        problem: problem of the learner, whose spaces, rest and tolerance are read.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self._problem, self._whole = problem, Tiling(problem, INTEREST, modes=(0, 1, 0), near=1)
+        self._n_added, self.regions = 0, list[Region]()  # no regions before the first goal
+
+    def follow(self, behaviour: Behaviour) -> None:
+        """Add the new goals of a learner, but not yet the last ones, which may still be pursued."""
+        new = slice(self._n_added, len(behaviour.points) - behaviour.own.at_once)
+        if new.start >= new.stop:
+            return
+        self._n_added, problem, box = new.stop, self._problem, self._whole.box
+        contexts, goals = map(np.array, zip(*behaviour.points[new], strict=True))
+        points, missed_by = np.hstack((contexts, goals)), np.array(behaviour.own.missed[new])
+        far = np.linalg.norm(goals - problem.rest, axis=1)
+        competences = -np.minimum(1.0, missed_by / np.maximum(far, problem.tolerance))  # eq. (7)
+        points = np.clip(points, box.low, np.nextafter(box.high, box.low))  # goals outside T count at its border
+        leaves = []
+        for region in self.regions or self._whole.regions:
+            inside = ((region.low <= points) & (points < region.high)).all(axis=1)
+            if n := int(inside.sum()):
+                region = region.extend(points[inside], competences[inside], np.zeros(n), np.full(n, "autonomous"))
+            leaves += self._cut(region)
+        self.regions = leaves
+
+    def _cut(self, region: Region) -> list[Region]:
+        """The parts of a region, cut at the median of its goals along the axis in which they differ most."""
+        if len(region.points) <= MOST:
+            return [region]
+        if len(region.path) <= DEPTH:
+            cuts = np.median(region.points, axis=0)
+            spread = region.points.std(axis=0) / self._whole.box.sides * (region.points < cuts).any(axis=0)
+            axis = int(spread.argmax())
+            if spread[axis]:
+                return [part for half in region.split(axis, float(cuts[axis])) for part in self._cut(half)]
+        return [region.keep(slice(-MOST * 3 // 4, None))]

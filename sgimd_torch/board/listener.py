@@ -20,9 +20,8 @@ from tensorboardX.event_file_writer import EventsWriter
 from tensorboardX.proto.event_pb2 import Event, SessionLog
 from tensorboardX.proto.summary_pb2 import Summary
 
-from sgimd_torch.board.curves import Behaviour, evaluation_curves, region_curves
+from sgimd_torch.board.curves import Behaviour, OwnRegions, evaluation_curves, region_curves
 from sgimd_torch.board.legend import as_markdown, meaning_of
-from sgimd_torch.board.own_regions import OwnRegions
 from sgimd_torch.board.pictures import maps_of
 from sgimd_torch.evaluation import Benchmark, Evaluation
 from sgimd_torch.spaces import Box, Episode
@@ -96,7 +95,7 @@ class BoardListener(EventFile):
         folder: Path,
         parts: Any,
         seconds: Callable[[], Mapping[str, float]],
-        curves: Callable[[], Mapping[str, float]] = dict,
+        curves: Callable[[], Mapping[str, float]],
     ) -> None:
         super().__init__(folder)
         self._config, self._learner, self._seconds, self._curves = parts.config, parts.learner, seconds, curves

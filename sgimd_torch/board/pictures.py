@@ -11,13 +11,13 @@ from typing import Any, Final
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from sgimd_torch.board.curves import branches
 from sgimd_torch.figures.learning import competence_map, misses
+from sgimd_torch.figures.save import pixels
 from sgimd_torch.figures.sections import Section, sections
 from sgimd_torch.goals.regions import Region
 from sgimd_torch.spaces import Array, Box
@@ -84,7 +84,5 @@ def _pixels(picture: Callable[[Axes, Section], object], maps: Sequence[Section])
         figure = Figure(size, dpi=120, layout="compressed")
         for ax, section in zip(figure.subplots(1, len(maps), squeeze=False).flat, maps, strict=True):
             picture(ax, section)
-        canvas: Any = FigureCanvasAgg(figure)
         figure.draw_without_rendering()  # the layout needs two passes; a single pass cuts labels off
-        canvas.draw()
-        return np.asarray(canvas.buffer_rgba())
+        return pixels(figure)

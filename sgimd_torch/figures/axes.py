@@ -92,9 +92,3 @@ def note(ax: Axes, text: str) -> None:
     """Write a text below the name of the x axis."""
     at = {"xycoords": "axes fraction", "textcoords": "offset points", "ha": "center", "va": "top"}
     ax.annotate(text, (0.5, 0), (0, -40), fontsize="small", **at)  # type: ignore[arg-type]
-
-
-def goal_rings(ax: Axes, points: ArrayLike, size: float) -> None:
-    """Draw yellow rings with a black edge at ``points`` ``(n, 2)``, ``size`` pt wide, for the goals of movements."""
-    for edge, width in (("black", 4.5), ("#f0e442", 2.5)):
-        ax.plot(*np.asarray(points).T, "o", mfc="none", mec=edge, ms=size, mew=width)

@@ -6,8 +6,6 @@ figure.   landing_points(ax, outcomes, box, section)
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
@@ -16,11 +14,9 @@ from matplotlib.colors import FuncNorm, ListedColormap, LogNorm, Normalize
 from matplotlib.patches import Rectangle
 
 from sgimd_torch.figures.axes import alike, colour_bar, note
-from sgimd_torch.figures.names import COLOURS, NAMES
+from sgimd_torch.figures.names import COLOURS
 from sgimd_torch.figures.sections import Section
 from sgimd_torch.spaces import Array, Box
-
-__all__ = ["COLOURS", "NAMES"]
 
 
 def landing_points(
@@ -29,8 +25,8 @@ def landing_points(
     box: Box,
     section: Section,
     *,
-    demonstrated: Array | None = None,
-    side: float = 0.05,
+    demonstrated: Array,
+    side: float,
 ) -> QuadMesh:
     """Outcomes of movements: a histogram on a logarithmic scale, in which empty tiles are white.
 
@@ -55,7 +51,7 @@ def landing_points(
     same_scale = box.dim == 2 and alike(box.sides)
     label = f"movements on a tile of {box.amount(side)}" if same_scale else "movements on a tile"
     colour_bar(ax, mesh, label)
-    if demonstrated is not None:
+    if len(demonstrated):
         different = np.unique(demonstrated, axis=0)
         crosses, label = section.points(different), f"{len(different)} demonstrated outcomes"
         ax.plot(*crosses.T, "x", color=COLOURS["sgim-d"], markersize=5, markeredgewidth=1.3, label=label)
@@ -142,18 +138,6 @@ def misses(
     drawn = ax.scatter(x, y, c=shown, s=14, cmap="viridis_r", norm=norm, edgecolors="none")
     colour_bar(ax, drawn, label, extend="both" if least else "max")
     section.frame(ax)
-
-
-def map_after(regions: Mapping[str, np.ndarray], movements: int) -> tuple[Array, Array, Array]:
-    """The interest map after ``movements`` movements, from the columns of the table ``regions`` of a record.
-
-    Returns:
-        Lower and upper corners, each ``(n_regions, context_dim + outcome_dim)``, and interests ``(n_regions,)``.
-    """
-    now = regions["movements"] == movements
-    dims = range(sum(name.startswith("low_") for name in regions))
-    lows, highs = (np.stack([regions[f"{side}_{k}"][now] for k in dims], axis=1) for side in ("low", "high"))
-    return lows, highs, regions["interest"][now]
 
 
 def _regions_in(

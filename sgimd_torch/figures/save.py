@@ -1,6 +1,6 @@
-"""Figures as files, all in one style and one resolution; equal data give equal files.
+"""Figures as files, all in one style and one resolution, or as pixels; equal data give equal files.
 
-save_figure(lambda: errors(data), Path("results/figures/errors"), "png", "svg")    # errors.png and errors.svg
+save_figure(lambda: errors(data), Path("results/figures/errors.svg"))
 """
 
 from __future__ import annotations
@@ -10,8 +10,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
 from matplotlib import rc_context
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from sgimd_torch.files import write_bytes
 
@@ -28,25 +31,20 @@ STYLE: Final[Any] = {
 }
 
 
-def save_figure(draw: Callable[[], Figure], stem: Path, *kinds: str) -> list[Path]:
-    """Draw a figure in ``STYLE`` and write a file for each kind, whole or not at all.
-
-    Args:
-        draw: function that makes the figure.
-        stem: path of the files without their suffix.
-        kinds: suffixes, such as "png".
-
-    Returns:
-        The files.
+def save_figure(draw: Callable[[], Figure], path: Path) -> None:
+    """Draw a figure in ``STYLE`` and write it to a file, whole or not at all; its suffix is png or svg.
 
     Raises:
-        OSError: a file cannot be written.
+        OSError: the file cannot be written.
     """
-    files = {stem.with_name(f"{stem.name}.{kind}"): kind for kind in kinds}
+    kind, content = path.suffix[1:], io.BytesIO()
     with rc_context(STYLE):
-        figure = draw()
-        for path, kind in files.items():
-            content = io.BytesIO()
-            figure.savefig(content, format=kind, dpi=DPI, metadata={"Date": None} if kind == "svg" else {})
-            write_bytes(path, content.getvalue())
-    return list(files)
+        draw().savefig(content, format=kind, dpi=DPI, metadata={"Date": None} if kind == "svg" else {})
+    write_bytes(path, content.getvalue())
+
+
+def pixels(figure: Figure) -> NDArray[np.uint8]:
+    """The drawing of a figure, ``(height, width, 4)``: red, green, blue and opacity."""
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba())

@@ -66,7 +66,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if failures := sweep(unfinished, Machine(len(configs))):
         raise Failed("\n".join(failures))
     variants = [Variant(name, [read_run(config.directory)]) for name, config in configs.items()]
-    (figure,) = save_figure(partial(figure_of_curves, variants), base.out / "demo", "png")
+    save_figure(partial(figure_of_curves, variants), figure := base.out / "demo.png")
     print("\nMean distance to the benchmark goals, by number of movements, and the time of a movement\n")
     table.main([str(base.out)])
     print(f"\nFigure  {figure}\nRuns    {base.out}\nTime    {time.monotonic() - began:.0f} s\n\nNext, try")

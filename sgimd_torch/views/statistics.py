@@ -101,13 +101,13 @@ def interval(
     return Interval(float(statistic(*samples)), *map(float, bootstrapped.confidence_interval))
 
 
-def iqm_interval(*strata: Array, rng: np.random.Generator, level: float = LEVEL) -> Interval:
-    """Interquartile mean of all values of all strata ``(n_seeds,)``; seeds are drawn within each stratum.
+def iqm_interval(values: Array, *, rng: np.random.Generator) -> Interval:
+    """Interquartile mean of ``(n_seeds,)`` values.
 
     Raises:
         ValueError: see ``interval``.
     """
-    return interval(lambda *drawn: interquartile_mean(np.concatenate(drawn, axis=-1)), *strata, rng=rng, level=level)
+    return interval(interquartile_mean, values, rng=rng)
 
 
 def over_seeds(values: Array) -> Interval | None:

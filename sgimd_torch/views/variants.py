@@ -260,15 +260,11 @@ class Comparison:
         return "better" if self.difference.high < 0 else "worse" if self.difference.low > 0 else "not told apart"
 
 
-def _own_after(run: Run, goals: OwnGoals, until: int) -> tuple[float, float, float]:
+def _own_after(run: Run, goals: OwnGoals, until: int) -> list[float]:
     """Median distance missed, share met and share failed of the last ``RECENT`` before ``until``; NaN for none."""
     missed, failed = goals.recent_misses(until), run.failed[max(0, until - RECENT) : until]
-    median = float(np.median(missed)) if len(missed) else np.nan
-    return median, _share(missed <= run.tolerance), _share(failed)
-
-
-def _share(values: NDArray[np.bool_]) -> float:
-    return float(values.mean()) if len(values) else np.nan
+    means = (np.median, missed), (np.mean, missed <= run.tolerance), (np.mean, failed)
+    return [float(mean(values)) if len(values) else np.nan for mean, values in means]
 
 
 def baseline_of(variants: Sequence[Variant], name: str | None = None) -> Variant | None:

@@ -18,12 +18,11 @@ from own import MODULE
 from runs import content_of
 from sgimd_torch import InterestMap, stream
 from sgimd_torch.board import pictures
-from sgimd_torch.board.curves import Behaviour, branches, evaluation_curves, region_curves
+from sgimd_torch.board.curves import Behaviour, OwnRegions, branches, evaluation_curves, region_curves
 from sgimd_torch.board.legend import LEGEND
 from sgimd_torch.board.listener import EventFile
-from sgimd_torch.board.own_regions import OwnRegions
 from sgimd_torch.competence import performance
-from sgimd_torch.evaluation import Evaluation
+from sgimd_torch.evaluation import Benchmark, Evaluation, save_benchmark
 from sgimd_torch.figures.sections import sections
 from sgimd_torch.options.command_line import main
 from sgimd_torch.runs import sweep
@@ -58,44 +57,40 @@ def interest_map(n=400, space=PLANE, context=(), worst=-1.0):
     return goals
 
 
-def test_a_goal_counts_once_and_as_reached_when_one_of_its_movements_came_near():
-    behaviour = Behaviour(tolerance=0.02)
-    for index, outcome in enumerate([FAR, NEAR, FAR]):
-        behaviour.episode(movement(index, GOAL, outcome))
-    behaviour.episode(movement(3, -GOAL, FAR))
-    values = behaviour.curves()
-    assert values["goals/reached"] == 0.5
-    assert values["goals/missed_by"] == pytest.approx((0.01 + np.hypot(1, 1.4)) / 2)
+def behaviour_of(*movements, at_once=1):
+    """The behaviour after these movements, each a tuple (goal, outcome, origin, demonstration); the last may lack."""
+    behaviour = Behaviour(0.02, at_once)
+    for index, told in enumerate(movements):
+        behaviour.episode(movement(index, *told))
+    return behaviour
 
 
-def test_robots_that_move_at_once_share_no_goal_and_global_exploration_aims_at_none():
-    def told(at_once, *movements):
-        behaviour = Behaviour(0.02, at_once)
-        for index, (goal, outcome, origin) in enumerate(movements):
-            behaviour.episode(movement(index, goal, outcome, origin))
-        return behaviour.curves()
+@pytest.mark.parametrize(
+    ("at_once", "movements", "reached"),
+    [
+        (1, [(GOAL, FAR), (GOAL, NEAR), (GOAL, FAR), (-GOAL, FAR)], 1 / 2),  # once, by its nearest outcome
+        (1, [(GOAL, FAR), (-GOAL, FAR), (GOAL, NEAR), (-GOAL, FAR)], 1 / 4),
+        (2, [(GOAL, FAR), (-GOAL, FAR), (GOAL, NEAR), (-GOAL, FAR)], 1 / 2),  # robots that move at once share no goal
+        (1, [(GOAL, NEAR, "global")], None),  # global exploration aims at none
+        (1, [(GOAL, NEAR), (SHOWN.outcome, FAR, "imitate")], 1),  # an imitation has no goal of the learner's own
+    ],
+)
+def test_a_goal_counts_once_and_as_reached_when_one_of_its_movements_came_near(at_once, movements, reached):
+    values = behaviour_of(*movements, at_once=at_once).curves()
+    assert values.get("goals/reached") == reached
+    if reached == 1 / 2:
+        assert values["goals/missed_by"] == pytest.approx((0.01 + np.hypot(1, 1.4)) / 2)
 
-    in_turn = [(GOAL, FAR, "local"), (-GOAL, FAR, "local"), (GOAL, NEAR, "local"), (-GOAL, FAR, "local")]
-    assert told(2, *in_turn)["goals/reached"] == 1 / 2
-    assert told(1, *in_turn)["goals/reached"] == 1 / 4
-    assert "goals/reached" not in told(1, (GOAL, NEAR, "global"))
 
-
-def test_imitations_count_for_the_teacher_and_not_as_goals_of_the_learners_own():
-    behaviour = Behaviour(0.02)
-    behaviour.episode(movement(0, GOAL, NEAR))
-    behaviour.episode(movement(1, SHOWN.outcome, SHOWN.outcome * 1.2, "imitate", SHOWN))
-    behaviour.episode(movement(2, SHOWN.outcome, SHOWN.outcome * 1.4, "imitate"))
-    values = behaviour.curves()
-    assert values["goals/reached"] == 1
+def test_imitations_count_for_the_teacher():
+    imitated = SHOWN.outcome, SHOWN.outcome * 1.2, "imitate", SHOWN
+    values = behaviour_of((GOAL, NEAR), imitated, (SHOWN.outcome, SHOWN.outcome * 1.4, "imitate")).curves()
     assert values["teacher/demonstrations"] == 1
     assert values["teacher/missed_by"] == pytest.approx(0.3 * np.sqrt(0.5))
 
 
 def test_shares_of_kinds_of_movements_sum_to_one_and_a_kind_that_was_seen_keeps_its_curve():
-    behaviour = Behaviour(0.02)
-    for index, origin in enumerate(["global", "local", "local", "imitate"]):
-        behaviour.episode(movement(index, GOAL, FAR, origin))
+    behaviour = behaviour_of(*((GOAL, FAR, origin) for origin in ("global", "local", "local", "imitate")))
     assert behaviour.curves().items() >= {"kind/global": 0.25, "kind/local": 0.5, "kind/imitate": 0.25}.items()
     behaviour.episode(Episode(4, np.zeros(0), None, None, None))
     values = {tag: value for tag, value in behaviour.curves().items() if tag.startswith("kind/")}
@@ -108,11 +103,8 @@ def test_requests_are_counted_by_strategy():
         request = Request(strategy[-3:], GOAL, strategy) if strategy else None
         behaviour.episode(Episode(index, np.zeros(0), Move(np.zeros(1), GOAL, "local"), FAR, None, request, reply))
     values = behaviour.curves()
-    assert (values["strategy/imitate ann"], values["strategy/imitate ben"], values["teacher/replies"]) == (
-        0.25,
-        0.25,
-        1,
-    )
+    assert values["strategy/imitate ann"] == values["strategy/imitate ben"] == 0.25
+    assert values["teacher/replies"] == 1
     behaviour.episode(movement(8, GOAL, FAR))
     assert behaviour.curves()["strategy/imitate ann"] == 0
 
@@ -221,11 +213,6 @@ def watched(tmp_path_factory, go):
     return out / "sgim-d" / "seed-003"
 
 
-def test_watching_a_run_changes_no_byte_of_it(tmp_path, go, watched):
-    assert go(tmp_path, *OPTIONS, "--board", "false") == 0
-    assert content_of(tmp_path / "sgim-d" / "seed-003") == content_of(watched)
-
-
 def test_the_curves_of_a_run_are_those_of_its_record(watched):
     curves, read = curves_of(watched), read_run(watched)
     for tag, column in {"mean": "mean_error", "p90": "p90_error", "noise_floor": "noise_floor"}.items():
@@ -295,14 +282,6 @@ def assert_same_board(directory, whole):
     assert found == wanted
 
 
-def test_a_board_depends_only_on_the_last_request(tmp_path, go, watched):
-    assert go(tmp_path, *OPTIONS, "--movements", 130, "--board", "false", "--evaluate_at", "60") == 0
-    assert go(tmp_path, *OPTIONS, "--resume") == 0
-    directory = tmp_path / "sgim-d" / "seed-003"
-    assert_same_board(directory, watched)
-    assert curves_of(directory)["time/physics"].keys() == {150}  # nobody knows those of what was replayed
-
-
 def test_without_evaluations_there_are_curves_of_the_learners_own_goals_and_of_failures(own):
     directory = Path("runs/practice/seed-000")
     words = "--environment planar-arm-7 --algorithm practice --movements 150 --evaluate-at [] --board true --out runs"
@@ -315,15 +294,19 @@ def test_without_evaluations_there_are_curves_of_the_learners_own_goals_and_of_f
 
 
 @pytest.mark.parametrize("algorithm", ["practice", "practice-taught", "sagg-riac", "sgim-d", "random"])
-def test_every_learner_with_goals_has_competence_per_region_and_others_say_that_they_have_none(own, algorithm):
-    words = f"--environment planar-arm-7 --algorithm {algorithm} --repeats 0 --evaluate-at [] --out".split()
-    assert command(main, [*words, "plain", "--movements", "150"]) == 0
-    assert command(main, [*words, "runs", "--movements", "150", "--board", "true"]) == 0
-    assert command(main, [*words, "resumed", "--movements", "80"]) == 0
-    assert command(main, [*words, "resumed", "--movements", "150", "--board", "true", "--resume"]) == 0
+def test_a_board_changes_no_byte_of_its_run_and_shows_it_from_the_first_movement_also_after_a_resume(own, algorithm):
+    """Regions, too: every learner with goals has competence per region, and others say that they have none."""
+    save_benchmark("few.npz", Benchmark("PlanarArm", np.array([[0.5, 0.5], [-0.3, 0.2]]), 0.1))
+    words = f"--environment planar-arm-7 --algorithm {algorithm} --repeats 0 --benchmark few.npz --out".split()
+    all_of_it = ["--movements", "150", "--evaluate-at", "60,120"]
+    assert command(main, [*words, "plain", *all_of_it]) == 0
+    assert command(main, [*words, "runs", *all_of_it, "--board", "true"]) == 0
+    assert command(main, [*words, "resumed", "--movements", "80", "--evaluate-at", "60"]) == 0
+    assert command(main, [*words, "resumed", *all_of_it, "--board", "true", "--resume"]) == 0
     plain, whole, resumed = (Path(out) / algorithm / "seed-000" for out in ("plain", "runs", "resumed"))
     assert content_of(plain) == content_of(whole)
     assert_same_board(resumed, whole)
+    assert curves_of(resumed)["time/physics"].keys() == {100, 150}  # nobody knows those of what was replayed
     texts = board_of(whole).Tensors("about/regions/text_summary") if algorithm in ("random", "practice-taught") else []
     begins = [(text.step, text.tensor_proto.string_val[0].decode()[:9]) for text in texts]
     assert begins == [(50, "No compet"), (150, "From here")][: len(texts)]
@@ -333,23 +316,12 @@ def test_every_learner_with_goals_has_competence_per_region_and_others_say_that_
         assert 150 in curves_of(whole)["competence/R"].keys() & curves_of(whole)["interest/R"].keys()
 
 
-def live_as(robot, *options):
-    """A watched run of a user's robot; returns its directory."""
-    words = f"--environment sliders:{robot} --algorithm sagg-riac --movements 120 --evaluate-at 60 --repeats 0"
-    assert command(main, [*words.split(), "--board", "true", "--out", "runs", *options]) == 0
-    return Path("runs/sagg-riac/seed-000")
-
-
-@pytest.mark.parametrize("robot", ["Slider", "Slider3", "Shifted"])
-def test_outcomes_of_any_dimension_have_curves_and_pictures(own, robot):
-    directory = live_as(robot)
+@pytest.mark.parametrize("robot", ["sliders:Slider", "sliders:Slider3", "sliders:Shifted", "formula:Slider2"])
+def test_outcomes_of_any_dimension_or_named_like_a_formula_have_curves_and_pictures(own, module, robot):
+    named = "self.outcomes = Box(-np.ones(2), 3 * np.ones(2), ('$\\\\frac{$', '$x_$'), '$\\\\frac{$')"
+    module("formula", MODULE.replace("        self.rest", f"        {named}\n        self.rest", 1))
+    words = f"--environment {robot} --algorithm sagg-riac --movements 60 --evaluate-at 30 --repeats 0 --out runs"
+    assert command(main, [*words.split(), "--board", "true"]) == 0
+    directory = Path("runs/sagg-riac/seed-000")
     assert {"error/mean", "competence/R", "interest/R", "goals/missed_by"} < curves_of(directory).keys()
     assert pictures_of(directory).keys() == {"map/error", "map/competence"}
-
-
-def test_an_outcome_that_is_named_like_a_formula_has_pictures(own, module):
-    named = "self.outcomes = Box(-np.ones(2), 3 * np.ones(2), ('$\\\\frac{$', '$x_$'), '$\\\\frac{$')"
-    module("formula", MODULE.replace("        self.rest", f"        {named}\n        self.rest"))
-    words = "--environment formula:Slider2 --algorithm sagg-riac --movements 40 --evaluate-at [] --repeats 0"
-    assert command(main, [*words.replace("[]", "20").split(), "--board", "true", "--out", "runs"]) == 0
-    assert pictures_of(Path("runs/sagg-riac/seed-000")).keys() == {"map/error", "map/competence"}

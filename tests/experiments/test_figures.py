@@ -9,7 +9,7 @@ from figures import FIGURES, main
 from made_lives import write_lives
 from made_up import MOVEMENTS, write_rows
 from page_tables import GAIN
-from sgimd_torch.figures.learning import COLOURS, NAMES
+from sgimd_torch.figures.names import COLOURS, NAMES
 from sgimd_torch.runs.signals import command
 
 NOT_MADE_UP = ("middle", "middle-process")

@@ -8,14 +8,8 @@ import pytest
 from matplotlib.figure import Figure
 
 from sgimd_torch.figures.axes import limits
-from sgimd_torch.figures.learning import (
-    COLOURS,
-    NAMES,
-    competence_map,
-    interest_map,
-    landing_points,
-    misses,
-)
+from sgimd_torch.figures.learning import competence_map, interest_map, landing_points, misses
+from sgimd_torch.figures.names import COLOURS, NAMES
 from sgimd_torch.figures.sections import sections, sections_of_regions
 from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.spaces import Box, stream
@@ -36,17 +30,13 @@ def test_every_algorithm_has_a_name_and_a_colour_of_its_own():
     assert len(set(COLOURS.values())) == len(COLOURS)
 
 
-def test_each_landing_point_inside_is_counted_on_its_tile_and_those_outside_are_told(ax):
+def test_landing_points_are_counted_on_tiles_or_told_and_demonstrated_ones_are_drawn_once(ax):
     outcomes = np.array([[-0.9, 0.9], [-0.8, 0.8], [0.9, -0.9], [3.0, 0.0]])
-    counts = landing_points(ax, outcomes, T, PLANE, side=1.0).get_array()
+    demonstrated = np.array([[0.1, 0.2], [-0.3, 0.4], [0.1, 0.2]])
+    counts = landing_points(ax, outcomes, T, PLANE, demonstrated=demonstrated, side=1.0).get_array()
     np.testing.assert_array_equal(counts.filled(0), [[0, 1], [2, 0]])  # rows are y, from below
     assert [text.get_text() for text in ax.texts] == ["1 of 4 landed outside: squares at the edge"]
     np.testing.assert_array_equal(ax.collections[1].get_offsets(), [[1.0, 0.0]])
-
-
-def test_what_was_demonstrated_several_times_is_one_demonstrated_outcome(ax):
-    demonstrated = np.array([[0.1, 0.2], [-0.3, 0.4], [0.1, 0.2]])
-    landing_points(ax, np.zeros((3, 2)), T, PLANE, demonstrated=demonstrated)
     assert ax.lines[0].get_label() == "2 demonstrated outcomes"
     np.testing.assert_array_equal(ax.lines[0].get_xydata(), demonstrated[[1, 0]])
 
@@ -71,14 +61,10 @@ def test_limits_of_few_points_hold_all_of_them(points):
     assert box.contains(points).all()
 
 
-def test_the_colours_of_competence_can_be_compared_and_small_misses_differ(ax):
-    drawn = competence_map(ax, LOWS, HIGHS, np.array([-0.04, -0.01]), PLANE)
+def test_regions_are_coloured_by_competence_on_one_scale_and_left_white_if_it_is_not_known(ax):
+    drawn = competence_map(ax, LOWS, HIGHS, np.array([-0.3, np.nan]), PLANE)
     assert drawn.get_clim() == (-1, 0)
     assert drawn.norm(np.array([-1, -0.25, -0.04, -0.01, 0])).tolist() == pytest.approx([0, 0.5, 0.8, 0.9, 1])
-
-
-def test_regions_of_unknown_competence_are_left_white(ax):
-    drawn = competence_map(ax, LOWS, HIGHS, np.array([-0.3, np.nan]), PLANE)
     np.testing.assert_array_equal(np.ma.getmaskarray(drawn.get_array()), [False, True])
     corners = np.stack([path.vertices for path in drawn.get_paths()])
     np.testing.assert_array_equal(corners.min(axis=1), LOWS)
@@ -112,24 +98,18 @@ def test_misses_are_at_their_goals(ax, dim, labels):
 )
 def test_each_dimension_is_in_a_picture(dim, pairs):
     assert [section.dims for section in sections(Box.cube(0, 1, dim))] == pairs
-
-
-def test_without_dimensions_there_is_nothing_to_draw():
     with pytest.raises(ValueError, match="nothing to draw"):
         sections(Box.cube(0, 1, 0))
 
 
-def test_points_are_projected_and_those_of_one_dimension_lie_in_the_middle_of_a_strip():
+def test_points_are_projected_and_tiles_have_the_proportions_of_their_picture():
     points = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
     assert sections(Box.cube(0, 9, 3))[1].points(points).tolist() == [[1.0, 3.0], [4.0, 6.0]]
     (strip,) = sections(Box.cube(-2, 2, 1))
     assert strip.points(points[:, :1]).tolist() == [[1.0, 0.5], [4.0, 0.5]]
     assert (strip.box.low.tolist(), strip.box.high.tolist()) == ([-2.0, 0.0], [2.0, 1.0])
-
-
-def test_a_tile_of_a_strip_has_its_height_and_one_of_sides_of_another_scale_their_proportions():
-    assert sections(Box.cube(-2, 2, 1))[0].tile(0.1).tolist() == [0.1, 1.0]
-    assert sections(Box.cube(-2, 2, 2))[0].tile(0.1).tolist() == [0.1, 0.1]
+    assert strip.tile(0.1).tolist() == [0.1, 1.0]
+    assert PLANE.tile(0.1).tolist() == [0.1, 0.1]
     assert sections(Box(np.zeros(2), np.array([100.0, 1.0])))[0].tile(10.0).tolist() == [10.0, 0.1]
 
 

@@ -1,4 +1,4 @@
-"""A figure as files: in our style, the same again, all of it or none."""
+"""A figure as a file: in our style, the same again, all of it or none."""
 
 from functools import partial
 
@@ -9,30 +9,22 @@ from matplotlib.figure import Figure
 from sgimd_torch.figures.save import STYLE, save_figure
 
 
-def a_line(values):
+def figure_of(text):
     figure = Figure()
-    figure.add_subplot().plot(values)
-    figure.text(0.5, 0.5, f"{rcParams['font.size']:g} pt")
+    figure.add_subplot().plot([1, 2])
+    figure.text(0.5, 0.5, f"{text} {rcParams['font.size']:g} pt", parse_math="frac" in text)
     return figure
 
 
-def test_every_kind_is_written_whole_in_our_style_and_the_same_again(tmp_path):
-    first, again = (
-        [path.read_bytes() for path in save_figure(partial(a_line, [1, 2]), tmp_path / out, "png", "svg")]
-        for out in ("a.b", "again")
-    )
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.b.png", "a.b.svg", "again.png", "again.svg"]
+@pytest.mark.parametrize(("kind", "sign"), [("png", b"IEND\xaeB`\x82"), ("svg", f"{STYLE['font.size']} pt".encode())])
+def test_a_figure_is_written_whole_in_our_style_and_the_same_again_or_the_old_file_stays(tmp_path, kind, sign):
+    paths = [tmp_path / f"{name}.{kind}" for name in ("a.b", "again")]
+    for path in paths:
+        save_figure(partial(figure_of, "text of"), path)
+    with pytest.raises(ValueError, match="frac"):  # no formula, which shows only when it is drawn
+        save_figure(partial(figure_of, r"$\frac$"), paths[1])
+    assert sorted(tmp_path.iterdir()) == paths
+    first, again = (path.read_bytes() for path in paths)
     assert first == again
-    assert first[0].endswith(b"IEND\xaeB`\x82")
-    assert f"{STYLE['font.size']} pt".encode() in first[1]
+    assert sign in first
     assert rcParams["font.size"] != STYLE["font.size"]
-
-
-def test_a_figure_that_cannot_be_drawn_leaves_the_old_file(tmp_path):
-    (path,) = save_figure(partial(a_line, [1, 2]), tmp_path / "a", "png")
-    old, broken = path.read_bytes(), Figure()
-    broken.text(0.5, 0.5, r"$\frac$")  # no formula, which shows only when it is drawn
-    with pytest.raises(ValueError, match="frac"):
-        save_figure(lambda: broken, tmp_path / "a", "png")
-    assert path.read_bytes() == old
-    assert [each.name for each in tmp_path.iterdir()] == ["a.png"]

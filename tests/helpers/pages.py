@@ -1,10 +1,11 @@
-"""Helpers for tests of reports: a parser of pages."""
+"""Helpers for tests of reports: a parser of pages, and figures of pages."""
 
 import html
 import re
 from html.parser import HTMLParser
 
 from markupsafe import escape
+from matplotlib.figure import Figure
 
 
 class Page(HTMLParser):
@@ -39,3 +40,14 @@ def rows_of(text, caption):
     table = table[table.index("<tr>") : table.index("</tbody>")]
     cells = [re.findall("<t[hd][^>]*>(.*?)</t[hd]>", row, re.DOTALL) for row in table.split("</tr>")[:-1]]
     return [[html.unescape(re.sub("<[^>]*>", "", cell)) for cell in row] for row in cells]
+
+
+def alts(text):
+    """The words for each image of a page."""
+    return [given["alt"] for name, given in Page(text).elements if name == "img"]
+
+
+def drawn(draw, *args):
+    """The figure that a function of a page draws."""
+    draw.__wrapped__(figure := Figure(), *args)
+    return figure

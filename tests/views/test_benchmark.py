@@ -1,11 +1,8 @@
 """Goals made from runs: near what they reached, from all of them together, for outcomes of any dimension."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from runs import write_about
 from sgimd_torch.evaluation import SIDES, load_benchmark, tile_side
 from sgimd_torch.options.command_line import main as live
 from sgimd_torch.runs.read import read_run
@@ -47,7 +44,7 @@ def test_goals_lie_on_tiles_that_were_reached_twice_and_a_run_uses_them(own, cap
     assert judged.evaluations["own"]["movements"].tolist() == [20, 40]
 
 
-def test_runs_are_named_one_by_one_by_variant_or_all_together(own):
+def test_runs_are_named_one_by_one_by_variant_or_all_together_and_the_seed_draws_within_their_tiles(own):
     for seed in (1, 2):
         run("--environment", "sliders:Slider2", "--seed", seed)
     files = []
@@ -57,10 +54,6 @@ def test_runs_are_named_one_by_one_by_variant_or_all_together(own):
     assert files[0] == files[1] == files[2]
     both, one = (goals_of(place, "--tiles", 60) for place in ("runs", "runs/random/seed-001"))
     assert both.side != one.side
-
-
-def test_the_seed_draws_within_the_same_tiles(own):
-    run("--environment", "sliders:Slider2")
     one, other = (goals_of("runs", "--tiles", 20, "--seed", seed) for seed in (3, 4))
     assert (np.floor((one.goals + 1) / one.side) == np.floor((other.goals + 1) / one.side)).all()
     assert not (one.goals == other.goals).any()
@@ -86,10 +79,10 @@ def test_about_as_many_goals_as_wanted_are_made_also_where_little_of_a_large_spa
 @pytest.mark.parametrize(
     ("movements", "spread", "tiles", "limit"),
     [
-        (4000, 1.0, 20, "no tiles are larger than 0.2"),
-        (4000, 0.15, 200, "no tiles are smaller than 0.05"),  # what is reached has room for 49 of them
+        (1000, 1.0, 20, "no tiles are larger than 0.4"),
+        (1000, 0.15, 200, "no tiles are smaller than 0.1"),  # what is reached has room for 49 of them
         (60, 1.0, 358, "tiles smaller than "),  # of 60 movements, hardly two land on one tile
-        (4000, 1.0, 200, ""),
+        (1000, 1.0, 200, ""),
     ],
 )
 def test_what_limits_the_number_of_goals_is_said(own, module, capsys, movements, spread, tiles, limit):
@@ -103,28 +96,9 @@ def test_what_limits_the_number_of_goals_is_said(own, module, capsys, movements,
 
 
 SPREAD = """
-import numpy as np
-from sgimd_torch import Box
+from sliders import *
 
-class Spread:
-    contexts, policies, outcomes = Box.cube(0, 1, 0), Box.cube(0, 1, 2), Box.cube(-1, 1, 2)
-    rest, outcome_noise = np.zeros(2), 0.0
-
-    def observe(self, rng):
-        return np.zeros(0)
-
+class Spread(Slider2):
     def execute(self, context, theta, rng):
-        return {spread} * (2 * theta - 1)
+        return 1 + 2 * {spread} * (2 * theta - 1)  # around the middle of T, whose sides are 4
 """
-
-
-def test_a_unit_with_escape_codes_is_refused_and_does_not_reach_the_terminal(own, capsys):
-    run("--environment", "sliders:Slider2")
-    found = read_run("runs/random/seed-000")
-    spaces = {name: [box.low.tolist(), box.high.tolist(), box.names, "\x1b[31m"] for name, box in found.spaces.items()}
-    write_about(Path("runs/random/seed-000"), spaces=spaces)
-    capsys.readouterr()
-    assert command(main, ["runs", "--out", "goals.npz"]) == 2
-    said = capsys.readouterr()
-    assert "\x1b" not in said.out + said.err
-    assert "without control characters" in said.err

@@ -4,7 +4,6 @@ import shlex
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from runs import content_of, start
 from sgimd_torch.evaluation import Benchmark, save_benchmark
@@ -17,33 +16,17 @@ LEARNERS = ("random", "sgim-d", "practice-taught")
 DEMO = "import sys; from sgimd_torch.__main__ import main; sys.argv.insert(1, 'demo'); sys.exit(main())"
 
 
-@pytest.fixture(scope="module")
-def options(tmp_path_factory):
-    path = tmp_path_factory.mktemp("benchmark") / "small.npz"
-    save_benchmark(path, Benchmark("FishingRod", np.array([[0.0, 0.5], [0.4, 0.3], [-0.5, 0.2]]), 0.1))
-    return ["--movements", "40", "--benchmark", str(path), "--evaluate_at", "30"]
-
-
-@pytest.fixture(scope="module")
-def shown(tmp_path_factory, options):
-    """A demo that has ended well: its folder, and what it printed."""
-    out = tmp_path_factory.mktemp("demo")
-    process = start(DEMO, *options, "--out", out)
+def test_the_demo_ends_with_all_runs_a_figure_and_a_table_and_a_second_start_uses_them(tmp_path, capsys):
+    out, benchmark = tmp_path / "out", tmp_path / "small.npz"
+    save_benchmark(benchmark, Benchmark("FishingRod", np.array([[0.0, 0.5], [0.4, 0.3], [-0.5, 0.2]]), 0.1))
+    options = [*f"--movements 40 --benchmark {benchmark} --evaluate_at 30 --out {out}".split()]
+    process = start(DEMO, *options)
     printed, said = process.communicate()
     assert process.returncode == 0, said
-    return out, printed, said
-
-
-@pytest.fixture(scope="module")
-def runs(shown):
-    return {algorithm: read_run(shown[0] / algorithm / "seed-000") for algorithm in LEARNERS}
-
-
-def test_the_demo_ends_well_with_all_runs_a_figure_and_a_table(shown, runs):
-    out, printed, said = shown
+    runs = {algorithm: read_run(out / algorithm / "seed-000") for algorithm in LEARNERS}
     assert [len(run.index) for run in runs.values()] == [40, 40, 40]
-    content = (out / "demo.png").read_bytes()
-    assert content.startswith(b"\x89PNG\r\n\x1a\n")
+    figure = (out / "demo.png").read_bytes()
+    assert figure.startswith(b"\x89PNG\r\n\x1a\n")
     assert str(out / "demo.png") in printed
     assert "SGIM-D chooses goals" in said  # what it is doing
     lines = {line.split()[0]: line.split() for line in printed.splitlines() if line}
@@ -55,16 +38,13 @@ def test_the_demo_ends_well_with_all_runs_a_figure_and_a_table(shown, runs):
         assert (program, name in WORDS["command"]) == ("sgimd", True)
         assert any(Path(word).exists() for word in words)
 
-
-def test_a_second_start_uses_what_is_there_and_fewer_movements_are_refused(shown, options, capsys):
-    out = shown[0]
-    runs, figure = [content_of(out / name / "seed-000") for name in LEARNERS], (out / "demo.png").read_bytes()
+    content = [content_of(run.path) for run in runs.values()]
     (out / "demo.png").unlink()
-    assert command(main, [*options, "--out", str(out)]) == 0
-    assert [content_of(out / name / "seed-000") for name in LEARNERS] == runs
+    assert command(main, options) == 0
+    assert [content_of(run.path) for run in runs.values()] == content
     assert (out / "demo.png").read_bytes() == figure
     capsys.readouterr()
-    assert command(main, [*options, "--movements", "30", "--out", str(out)]) == 1
+    assert command(main, [*options, "--movements", "30"]) == 1
     said = capsys.readouterr().err
     assert "40 movements already" in said
     assert "Traceback" not in said

@@ -138,13 +138,9 @@ def viewing(model: mujoco.MjModel, data: mujoco.MjData, points: Array) -> int | 
 def _edges(robot: MujocoRobot, shot: Shot) -> Array:
     """``(n_edges, 2, 3)`` m, the edges of T in the world, for each measured place."""
     corners = np.array(list(product(*zip(robot.outcomes.low, robot.outcomes.high, strict=True))))
-    places, edges = robot.located(corners, robot.start_in(shot.context)), dict[bytes, Array]()
-    for one, other in combinations(range(len(corners)), 2):
-        if (corners[one] != corners[other]).sum() == 1:
-            for edge in places[[one, other]].swapaxes(0, 1):
-                if not np.array_equal(*edge):
-                    edges[edge.tobytes()] = edge
-    return np.array([*edges.values()]).reshape(-1, 2, 3)
+    ends = [[k, j] for k, j in combinations(range(len(corners)), 2) if (corners[k] != corners[j]).sum() == 1]
+    edges = robot.located(corners, robot.start_in(shot.context))[ends].swapaxes(1, 2).reshape(-1, 2, 3)
+    return np.unique(edges[(edges[:, 0] != edges[:, 1]).any(axis=1)], axis=0)
 
 
 def _filmed(shot: Shot) -> Filmed:

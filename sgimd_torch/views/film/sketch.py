@@ -16,15 +16,14 @@ from typing import Any, Final
 
 import numpy as np
 from matplotlib import rc_context
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from PIL import Image
 
 from sgimd_torch.environments.sketch import Sketch
-from sgimd_torch.figures.axes import goal_rings, limits, over_movements
+from sgimd_torch.figures.axes import limits, over_movements
 from sgimd_torch.figures.learning import misses
-from sgimd_torch.figures.save import STYLE
+from sgimd_torch.figures.save import STYLE, pixels
 from sgimd_torch.figures.sections import sections
 from sgimd_torch.spaces import Array, Box, rounded
 from sgimd_torch.views.film.reel import HEIGHT, WIDTH, Frame, Shot
@@ -39,6 +38,7 @@ PATH: Final = "#e08a55"  # colour of the path of a chain's end
 END: Final = "#d1341f"  # colour of a chain's end, and of the outcome
 OBJECT: Final = "#2f7f6f"  # colour of an object
 PAST: Final = "#9db4c8"  # colour of past outcomes
+GOAL: Final = "#f0e442"  # colour of the goal's ring, which has a black edge
 
 
 class Sketchbook:
@@ -74,7 +74,8 @@ class Sketchbook:
         if self._space.dim > 1:
             ax.add_patch(Rectangle(self._space.low[:2], *self._space.sides[:2], fill=False, edgecolor=BORDER))  # type: ignore[arg-type]
         ax.plot(*in_picture(shot.past).T, "o", color=PAST, ms=2, mec="none")
-        goal_rings(ax, in_picture(shot.goal[None]), 14)
+        for edge, width in (("black", 4.5), (GOAL, 2.5)):
+            ax.plot(*in_picture(shot.goal[None]).T, "o", mfc="none", mec=edge, ms=14, mew=width)
         for chain in sketch.chains:
             ax.plot(*chain[: last + 1, -1].T, color=PATH, lw=1.5)
         for chain in sketch.chains:
@@ -82,7 +83,7 @@ class Sketchbook:
             ax.plot(*chain[last, -1:].T, "o", color=OBJECT if chain.shape[1] == 1 else END, ms=7)
         if time >= sketch.landed:
             ax.plot(*in_picture(sketch.outcome[None]).T, "x", color=END, ms=12, mew=2)
-        return Image.fromarray(pixels(self._figure))
+        return Image.fromarray(pixels(self._figure)[..., :3])
 
 
 def in_picture(points: Array) -> Array:
@@ -119,16 +120,9 @@ def panel(space: Box, goals: Array, errors: Array, now: int, curve: tuple[Array,
         below.plot(movements[seen], means[seen], "o-", color=colour, ms=4)
         over_movements(below, space.in_unit("mean error"))
         below.set(xlim=(0, 1.05 * float(movements.max())), ylim=(0, 1.1 * float(means.max()) or 1.0))
-        return pixels(figure)
+        return pixels(figure)[..., :3]
 
 
 def blank(width: float, **options: Any) -> Figure:
     """A figure with a width in pixels and the height of the film; ``options`` go to matplotlib."""
     return Figure(figsize=(width / DPI, HEIGHT / DPI), dpi=DPI, **options)
-
-
-def pixels(figure: Figure) -> Frame:
-    """The drawing of a figure as a frame."""
-    canvas: Any = FigureCanvasAgg(figure)
-    canvas.draw()
-    return np.array(canvas.buffer_rgba())[..., :3]

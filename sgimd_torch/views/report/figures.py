@@ -18,8 +18,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sgimd_torch.figures.axes import LEGEND, alike, curve_in_band, limits, over_movements
-from sgimd_torch.figures.learning import COLOURS, interest_map, landing_points, map_after
+from sgimd_torch.figures.learning import interest_map, landing_points
 from sgimd_torch.figures.learning import misses as draw_misses
+from sgimd_torch.figures.names import COLOURS
 from sgimd_torch.figures.save import STYLE as FILE_STYLE
 from sgimd_torch.figures.sections import Section, sections, sections_of_regions
 from sgimd_torch.runs.read import Run
@@ -164,12 +165,12 @@ def planes_of(variants: Sequence[Variant]) -> dict[str, Box]:
 @png
 def landing(figure: Figure, variant: Variant, plane: Box) -> None:
     """Outcomes of movements and of demonstrations on a part of T; points outside this part are marked at its edge."""
-    panels, demonstrated = sections(plane), variant.demonstrated
+    panels = sections(plane)
     for ax, section in zip(_panels(figure, panels), panels, strict=True):
         sides = section.box.sides
         longest = float(sides[0] if section.is_strip or not alike(sides) else sides.max())
-        side, crosses = rounded(longest / TILES), demonstrated if len(demonstrated) else None
-        landing_points(ax, variant.landed, plane, section, demonstrated=crosses, side=side)
+        side = rounded(longest / TILES)
+        landing_points(ax, variant.landed, plane, section, demonstrated=variant.demonstrated, side=side)
 
 
 @png
@@ -191,10 +192,12 @@ def has_regions(run: Run) -> bool:
 def regions(figure: Figure, run: Run) -> None:
     """The regions of T at the last evaluation, coloured by interest, with the latest goals."""
     assert run.regions is not None
-    lows, highs, interests = map_after(run.regions, run.regions["movements"].max())
+    last = run.regions["movements"] == run.regions["movements"].max()
+    dims = range(sum(name.startswith("low_") for name in run.regions))
+    lows, highs = (np.stack([run.regions[f"{side}_{k}"][last] for k in dims], axis=1) for side in ("low", "high"))
     panels = sections_of_regions(lows, highs, run.spaces["outcomes"], run.spaces["contexts"])
     for ax, section in zip(_panels(figure, panels), panels, strict=True):
-        interest_map(ax, lows, highs, interests, section, goals=run.chosen_goals()[-GOALS:])
+        interest_map(ax, lows, highs, run.regions["interest"][last], section, goals=run.chosen_goals()[-GOALS:])
 
 
 def _panels(figure: Figure, maps: Sequence[Section]) -> list[Axes]:

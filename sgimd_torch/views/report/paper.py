@@ -35,13 +35,11 @@ from sgimd_torch.runs.signals import parser_of, say
 from sgimd_torch.runs.sweep import add_options, given_in, refuse, run_all
 from sgimd_torch.views.report import paper_figures, provenance
 from sgimd_torch.views.report.command import rendered
-from sgimd_torch.views.report.replication import Replication
+from sgimd_torch.views.report.replication import LEARNERS, TAUGHT, Replication
 from sgimd_torch.views.results import results
 from sgimd_torch.views.statistics import LEAST_SEEDS
 from sgimd_torch.views.variants import Variant, best_first
 
-LEARNERS: Final = ("random", "sagg-riac", "observation", "imitation", "sgim-d")
-TAUGHT: Final = ("observation", "imitation", "sgim-d")
 PARTS: Final[dict[str, tuple[tuple[str, ...], tuple[str, ...]]]] = {
     "": (LEARNERS, ()),
     **{

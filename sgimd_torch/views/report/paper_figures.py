@@ -16,7 +16,7 @@ from sgimd_torch.figures.learning import landing_points
 from sgimd_torch.figures.names import COLOURS, NAMES
 from sgimd_torch.figures.sections import sections
 from sgimd_torch.views.report.figures import draw_curves, png
-from sgimd_torch.views.report.replication import BY, SMALL, TILE, Replication
+from sgimd_torch.views.report.replication import BY, LEARNERS, SMALL, TAUGHT, TILE, Replication
 
 THREE: Final = ("random", "sagg-riac", "sgim-d")
 OF_DEMONSTRATOR: Final = {1: "#0072b2", 2: "#e69f00", 3: "#d55e00"}
@@ -26,13 +26,12 @@ WITHIN: Final = 0.99  # share of outcomes that a histogram shows
 
 def five_learners(study: Replication) -> str:
     """Error curves of the five learners."""
-    return _panels(study, {"": {name: name for name in ("random", "sagg-riac", "observation", "imitation", "sgim-d")}})
+    return _panels(study, {"": {name: name for name in LEARNERS}})
 
 
 def by_demonstrator(study: Replication) -> str:
     """Error curves of the three taught learners, a panel for each demonstrator."""
-    taught = ("observation", "imitation", "sgim-d")
-    return _panels(study, {f"demonstrator {k}": {name: name + end for name in taught} for k, end in BY.items()})
+    return _panels(study, {f"demonstrator {k}": {name: name + end for name in TAUGHT} for k, end in BY.items()})
 
 
 def both_spaces(study: Replication) -> str:
@@ -78,8 +77,7 @@ def outcomes(figure: Figure, study: Replication) -> None:
         for ax, run in zip(axes[:, column], variant.runs[:n], strict=True):
             landed = run.outcomes[plane.contains(run.outcomes)]
             shown = np.array([demonstration.outcome for demonstration in run.demonstrations])
-            crosses = shown if len(shown) else None
-            meshes.append(landing_points(ax, landed, plane, section, demonstrated=crosses, side=TILE))
+            meshes.append(landing_points(ax, landed, plane, section, demonstrated=shown, side=TILE))
             ax.set_title(f"{NAMES[name]}, seed {run.config['seed']}", pad=22)  # above the legend
             ax.label_outer()
     most, bars = max(float(mesh.get_clim()[1]) for mesh in meshes), [mesh.colorbar for mesh in meshes if mesh.colorbar]
@@ -154,13 +152,13 @@ def repeated(figure: Figure, study: Replication) -> None:
     """Outcomes of three random policies, each repeated: in T, and around the mean of each policy."""
     figure.set_size_inches(8.6, 4.3)
     whole, near = figure.subplots(1, 2)
-    for k, landed in zip(OF_DEMONSTRATOR, study.repeated, strict=False):
-        for ax, points in ((whole, landed), (near, landed - landed.mean(axis=0))):
-            ax.plot(*points.T, ".", color=OF_DEMONSTRATOR[k], markersize=5, label=f"policy {k}")
+    landed = study.repeated[: len(OF_DEMONSTRATOR)]
+    around = landed - landed.mean(axis=1, keepdims=True)
+    for ax, places in ((whole, landed), (near, around)):
+        for (k, colour), points in zip(OF_DEMONSTRATOR.items(), places, strict=True):
+            ax.plot(*points.T, ".", color=colour, markersize=5, label=f"policy {k}")
     whole.set(xlim=(-1, 1), ylim=(-1, 1), title="in T", xlabel="x (m)", ylabel="y (m)", aspect="equal")
-    most = 1.1 * max(
-        float(np.abs(landed - landed.mean(axis=0)).max()) for landed in study.repeated[: len(OF_DEMONSTRATOR)]
-    )
+    most = 1.1 * float(np.abs(around).max())
     near.set(
         xlim=(-most, most),
         ylim=(-most, most),

@@ -23,6 +23,8 @@ from sgimd_torch.views.results import MISSING
 from sgimd_torch.views.statistics import Interval, interval_text
 from sgimd_torch.views.variants import Variant
 
+LEARNERS: Final = ("random", "sagg-riac", "observation", "imitation", "sgim-d")
+TAUGHT: Final = ("observation", "imitation", "sgim-d")
 BY: Final = {1: "-demonstrator-1", 2: "-demonstrator-2", 3: ""}  # endings of variants by their demonstrator
 SMALL: Final = Box.cube(-1.0, 1.0, 2)  # T of the paper (m), of which the large T is 10^4 times
 TILE: Final = 0.1  # m, side of the tiles by which the reached part of T is counted
@@ -103,10 +105,7 @@ class Replication:
 
     def by_demonstrator(self) -> Table:
         """Errors at the end, by learner and demonstrator."""
-        rows = [
-            (NAMES[name], *(_error(self.variants[name + end]) for end in BY.values()))
-            for name in ("observation", "imitation", "sgim-d")
-        ]
+        rows = [(NAMES[name], *(_error(self.variants[name + end]) for end in BY.values())) for name in TAUGHT]
         rows.append((f"{NAMES['sagg-riac']}, not taught", *[_error(self.variants["sagg-riac"])] * len(BY)))
         return Table("Errors after the last movement (m)", ("learner", *(f"demonstrator {k}" for k in BY)), rows)
 
