@@ -12,6 +12,7 @@ import pytest
 import torch
 
 from boards import curves_of
+from models import ARM, problem_of
 from runs import ROOT, about_of, content_of, write_about
 from sgimd_torch.board import listener
 from sgimd_torch.board.legend import LEGEND
@@ -20,6 +21,7 @@ from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.forward_model.checkpoints import Checkpoints
 from sgimd_torch.forward_model.model import ForwardModel
 from sgimd_torch.forward_model.shared import ModelListener
+from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.memory import Memory
 from sgimd_torch.options.build import build
 from sgimd_torch.options.catalogue import WORDS
@@ -294,12 +296,13 @@ def listen(tmp_path):
     with Record.make(tmp_path / RUN_FILE, (0, 7, 2), {}) as record:
 
         def listen(n, before=lambda index, model: None):
-            model, memory, arm = ForwardModel(0, 7, 2, rate=1.0), Memory(0, 7, 2), PlanarArm(7)
-            trains = ModelListener(record, model, lambda: model.trusted, memory, Seconds({}), Checkpoints(tmp_path))
+            model, memory = ForwardModel(0, 7, 2, rate=1.0), Memory(0, 7, 2)
+            inverse, checkpoints = NearestNeighbour(problem_of(memory)), Checkpoints(tmp_path)
+            trains = ModelListener(record, model, inverse, memory, Seconds({}), checkpoints)
             rng, curves = stream(0, "exemplars"), []
             for index in range(n):
                 theta = rng.random(7)
-                memory.add(NO_CONTEXT, theta, arm.execute(NO_CONTEXT, theta, rng))
+                memory.add(NO_CONTEXT, theta, ARM.execute(NO_CONTEXT, theta, rng))
                 before(index, model)
                 move = Move(theta, np.full(2, index // 2), "local")
                 trains.episode(Episode(index, NO_CONTEXT, move, memory.outcomes[-1], None), replayed=False)
