@@ -210,9 +210,6 @@ def fabric_on(accelerator: str) -> Fabric:
 def one_thread() -> Iterator[None]:
     """One thread of torch in a block or a decorated function, because sums of several threads round differently."""
     before = torch.get_num_threads()
-    if before == 1:
-        yield
-        return
     torch.set_num_threads(1)
     try:
         yield

@@ -409,7 +409,7 @@ def test_a_dataset_that_is_damaged_or_of_another_kind_is_refused(dataset, capsys
 
 def test_a_file_of_a_dataset_names_its_folder(dataset, capsys):
     assert imported(last(dataset), "--joints", STATE, "--outcome", PLACE) is None
-    assert f"is one file of a LeRobot dataset; name the dataset instead: {dataset.absolute()}" in capsys.readouterr().err
+    assert f"one file of a LeRobot dataset; name the dataset instead: {dataset.absolute()}\n" in capsys.readouterr().err
 
 
 def bent(angle, outcome=(0.0, 0.0)):
