@@ -6,7 +6,7 @@ A replay writes the tables of the record again, except rows that come before a c
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from itertools import islice
 from pathlib import Path
@@ -49,9 +49,8 @@ class SharedModel(Trained):
     def listener(self, loop: RunLoop) -> ModelListener:
         """Listener that refreshes the model in a run."""
         learner, config = loop.parts.learner, loop.parts.config
-        asked = partial(uses_model, learner.inverse, self.model)
         checkpoints = Checkpoints(config.directory, at_evaluations=config.checkpoints)
-        return ModelListener(loop.record, self.model, asked, learner.memory, loop.seconds, checkpoints)
+        return ModelListener(loop.record, self.model, learner.inverse, learner.memory, loop.seconds, checkpoints)
 
     def restore(self, directory: Path, refreshes: Sequence[Row], span: tuple[float, float]) -> None:
         """Let a replay load the last usable checkpoint of the run in ``directory`` instead of training."""
@@ -101,7 +100,7 @@ class ModelListener(Listener):
     Args:
         record: record of the run.
         model: forward model of the run.
-        asked: function that returns whether the learner uses the model now.
+        inverse: inverse model of the learner.
         memory: memory of the learner.
         seconds: clock of the run; it includes the training during a replay.
         checkpoints: checkpoints of the run.
@@ -111,13 +110,13 @@ class ModelListener(Listener):
         self,
         record: Record,
         model: ForwardModel,
-        asked: Callable[[], bool],
+        inverse: Inverse,
         memory: Memory,
         seconds: Seconds,
         checkpoints: Checkpoints,
     ) -> None:
         self._record, self._model, self._memory, self._seconds = record, model, memory, seconds
-        self._uses_model, self._asked, self._checkpoints = asked, False, checkpoints
+        self._inverse, self._is_used, self._checkpoints = inverse, False, checkpoints
         self._curves: dict[str, float] = {}
         self._refresh: Row = ()  # row of the last refresh
         self._written: Row = ()  # row of the refresh in the last checkpoint
@@ -138,7 +137,7 @@ class ModelListener(Listener):
         if kept := self._kept.get(movements):
             n_new = kept[1] - self._refresh[1] if self._refresh else 0
             self._told(kept, np.array([cells for _, *cells in islice(self._kept_predictions, n_new)]))
-            self._asked = self._uses_model()
+            self._is_used = uses_model(self._inverse, self._model)
         if refresh is None:
             return
         error, fit, predicted = self._model.relative_error, refresh.fit, np.empty((0, 0))
@@ -151,10 +150,10 @@ class ModelListener(Listener):
             self._record.add_rows("predictions", rows)
         self._told(row, predicted)
         news = ["training diverged; the forward model keeps its last good weights"] if fit.diverged else []
-        asked = self._uses_model()
-        if asked != self._asked:
-            self._asked = asked
-            who = "the forward model is used from here on" if asked else NOT_USED
+        is_used = uses_model(self._inverse, self._model)
+        if is_used != self._is_used:
+            self._is_used = is_used
+            who = "the forward model is used from here on" if is_used else NOT_USED
             news.append(f"{who}: {self._how_wrong(error)}")
         if not replayed:
             self._curves["time/training_step"] = fit.seconds
@@ -177,7 +176,7 @@ class ModelListener(Listener):
 
     def close(self) -> None:
         """Print a message if the model is not used."""
-        if not self._asked:
+        if not self._is_used:
             trained = self._model.trained
             why = self._how_wrong(self._model.relative_error) if trained else "there were too few exemplars to train it"
             say(f"{NOT_USED}: {why}")
@@ -199,7 +198,7 @@ class ModelListener(Listener):
             self._curves["model/coverage"] = coverage(outcomes, mean, np.hypot(epistemic, aleatoric), LEVEL)
 
     def _how_wrong(self, error: float) -> str:
-        unproved = not self._asked and self._model.trusted
+        unproved = not self._is_used and self._model.trusted
         proof = ", once it predicts movements as well as a local process" if unproved else ""
         return f"its relative error is {error:.3f}, it is trusted up to {self._model.trust:g}{proof}"
 

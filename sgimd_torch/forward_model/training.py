@@ -74,7 +74,7 @@ class OnlineTrainer:
     newest: int
     batch: int
     accelerator: str
-    fabric: Fabric | None = field(init=False)
+    fabric: Fabric = field(init=False)
     optimizer: Any = None
     moments: Any = None  # of an optimiser that is still to be made
 
@@ -83,8 +83,6 @@ class OnlineTrainer:
 
     def prepare(self) -> Fabric:
         """Move the weights to the device for training and make the optimiser, unless this was done before."""
-        if self.fabric is None:
-            self.fabric = fabric_on(self.accelerator)
         if self.optimizer is None:
             self.model.to(self.fabric.device)
             self.optimizer = self.fabric.setup_optimizers(self.model.configure_optimizers())
@@ -158,7 +156,7 @@ class OnlineTrainer:
 
     def __getstate__(self) -> dict[str, Any]:
         """State for copies and other processes, without the optimiser."""
-        return {**self.__dict__, "fabric": None, "optimizer": None, "moments": None}
+        return {**self.__dict__, "optimizer": None, "moments": None}
 
     def _draw(self, rows: torch.Tensor) -> torch.Tensor:
         """Random rows ``(members, batch)``; the first quarter of each batch is drawn from the newest exemplars."""
@@ -212,9 +210,6 @@ def fabric_on(accelerator: str) -> Fabric:
 def one_thread() -> Iterator[None]:
     """One thread of torch in a block or a decorated function, because sums of several threads round differently."""
     before = torch.get_num_threads()
-    if before == 1:
-        yield
-        return
     torch.set_num_threads(1)
     try:
         yield

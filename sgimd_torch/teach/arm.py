@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
+from sgimd_torch.environments.models.places import joints_above
 from sgimd_torch.spaces import Array, Box, check_point, read_only
 from sgimd_torch.teach.led import HandLed
 
@@ -190,11 +191,7 @@ class Arm:
 
     def _trouble(self, body: int) -> str:
         """Reason why a body is not a link of the arm, "" if it is a link."""
-        moved_by, above = set[int](), body
-        while above:
-            first = int(self._model.body_jntadr[above])
-            moved_by |= set(range(first, first + int(self._model.body_jntnum[above])))
-            above = int(self._model.body_parentid[above])
+        moved_by = set(joints_above(self._model, body))
         if not moved_by:
             return "no joint moves it"
         return "" if moved_by <= set(self._joints) else "joints not led move it, too"

@@ -6,7 +6,7 @@ The arm, the rod and robots from model files are known here. A robot of your own
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import mujoco
@@ -103,15 +103,13 @@ def arm_led(arm: PlanarArm) -> HandLed:
     n, limits = arm.policies.dim, arm.angles(np.ones(arm.policies.dim))
     names = tuple(f"joint_{k}" for k in range(n))
     fastest = 1.5 * limits, 6 * limits  # largest speed and acceleration of 3 t^2 - 2 t^3
-    return HandLed(planar_model([1 / n] * n), names, "end", Box(-limits, limits), np.zeros(n), *fastest)
+    return HandLed(planar_model(n, 1 / n), names, "end", Box(-limits, limits), np.zeros(n), *fastest)
 
 
-def planar_model(lengths: Sequence[float]) -> mujoco.MjModel:
-    """An arm in the plane z = 0 with a hinge before each link of ``lengths`` (m); at zero angles it lies along +x."""
-    thickness = 0.02 * sum(lengths)
-    inner = f'<site name="end" pos="{lengths[-1]} 0 0"/>'
-    for k in reversed(range(len(lengths))):
-        begins = lengths[k - 1] if k else 0
-        inner = f"""<body name="link_{k}" pos="{begins} 0 0"><joint name="joint_{k}" axis="0 0 1"/>
-            <geom type="capsule" fromto="0 0 0 {lengths[k]} 0 0" size="{thickness}"/>{inner}</body>"""
+def planar_model(n_links: int, length: float) -> mujoco.MjModel:
+    """An arm in the plane z = 0 with a hinge before each link of a ``length`` (m); at zero angles it lies along +x."""
+    inner = f'<site name="end" pos="{length} 0 0"/>'
+    for k in reversed(range(n_links)):
+        inner = f"""<body name="link_{k}" pos="{length if k else 0} 0 0"><joint name="joint_{k}" axis="0 0 1"/>
+            <geom type="capsule" fromto="0 0 0 {length} 0 0" size="{0.02 * n_links * length}"/>{inner}</body>"""
     return mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{inner}</worldbody></mujoco>")

@@ -35,7 +35,7 @@ class Scene:
     Args:
         server: web server of the page.
         led: model and led joints of the robot.
-        leading: the arm in its present posture.
+        arm: the arm in its present posture.
         outcomes: T.
         goals: ``(n_goals, outcome_dim)`` goals of the benchmark.
 

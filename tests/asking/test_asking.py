@@ -11,6 +11,7 @@ from sgimd_torch.asking.algorithms import SEARCHING, sgim_acts, sgim_im
 from sgimd_torch.asking.teachers import AnsweringTeacher, high_half, low_half
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.goals.uniform import UniformGoals
+from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.parts import Demonstrator, Strategy
 from sgimd_torch.runs.tasks.robots import arm_demonstrations
 from sgimd_torch.session import run
@@ -28,9 +29,9 @@ def halves(seed=0, shown=SHOWN, **options):
     }
 
 
-def acts(arm=ARM, seed=0, teachers=None, **options):
+def acts(arm=ARM, seed=0, teachers=None, translate=last_posture, **options):
     teachers = halves() if teachers is None else teachers
-    return sgim_acts(arm, seed, correspondence=last_posture, teachers=teachers, **options)
+    return sgim_acts(arm, seed, correspondence=translate, teachers=teachers, inverse=NearestNeighbour, **options)
 
 
 def live(learner, teachers, movements=150, arm=ARM, seed=0, **options):
@@ -192,7 +193,7 @@ def late_requests(movements, after, noise=0.0, **more):
         teachers = halves(seed, arm_demonstrations(arm))
         for name, knows in more.items():
             teachers[name] = AnsweringTeacher(arm_demonstrations(arm), stream(seed, name), knows=knows)
-        learner = sgim_acts(arm, seed, correspondence=arm.correspondence, teachers=teachers)
+        learner = acts(arm, seed, teachers, arm.correspondence)
         requests += [e.request for e in live(learner, teachers, movements, arm, seed)[after:] if e.request]
     assert len(requests) > 40
     return requests

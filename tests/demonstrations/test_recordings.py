@@ -6,6 +6,7 @@ import json
 import os
 import re
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
@@ -29,10 +30,27 @@ BARE = ONE.partition("\n")[2]
 UNTIMED = "b,a,x,y\n0.2,0.1,9,9\n0.4,0.3,9,9\n0.6,0.5,0.7,-0.8\n"
 POINTER = "version https://git-lfs.github.com/spec/v1\noid sha256:abc\nsize 9\n"
 NAMED = "--joints a,b --outcome x,y"
+SHOWN, DATASET = Path("shown.npz"), Path("arm")  # in the folder of a test
 
 
 def sgimd(*words, view="demonstrations"):
     return command(_call, [view, *map(str, words)])
+
+
+@pytest.fixture(autouse=True)
+def _folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+def imported(source, *words):
+    """The demonstrations that an import writes; None if it is refused."""
+    SHOWN.unlink(missing_ok=True)
+    try:
+        code = sgimd("import", source, *words, "--out", SHOWN)
+    except SystemExit as end:  # of the parser of options
+        code = end.code
+    assert (code, SHOWN.exists()) in ((0, True), (2, False))
+    return load_demonstrations(SHOWN) if code == 0 else None
 
 
 @st.composite
@@ -179,34 +197,27 @@ REFUSED = {
 }
 
 
-def imported(tmp_path, text, words):
-    """The exit code of an import of a text."""
-    (tmp_path / "one.txt").write_bytes(text.encode())
-    words = [word.replace("_", " ") for word in words.split()]
-    return sgimd("import", tmp_path / "one.txt", *words, "--out", tmp_path / "shown.npz")
+def of_text(text, words):
+    """The demonstrations that an import of a text writes."""
+    Path("one.txt").write_bytes(text.encode())
+    return imported("one.txt", *(word.replace("_", " ") for word in words.split()))
 
 
 @pytest.mark.parametrize("kind", RIGHT)
-def test_a_text_is_imported_as_its_options_say(tmp_path, kind):
-    assert imported(tmp_path, *RIGHT[kind]) == 0
-    (shown,) = load_demonstrations(tmp_path / "shown.npz")
+def test_a_text_is_imported_as_its_options_say(kind):
+    (shown,) = of_text(*RIGHT[kind])
     np.testing.assert_allclose(shown.times, [0.0, 0.5, 1.0])  # they may begin at any time
     np.testing.assert_allclose(shown.trajectory, [[0.1, 0.2], [0.3, 0.4], [0.5, 0.6]], rtol=1e-12)
     assert shown.outcome.tolist() == [0.7, -0.8]  # of the last row
 
 
 @pytest.mark.parametrize("kind", REFUSED)
-def test_a_text_that_could_be_read_wrongly_is_refused_in_a_line(tmp_path, capsys, kind):
+def test_a_text_that_could_be_read_wrongly_is_refused_in_a_line(capsys, kind):
     text, words, message = REFUSED[kind]
-    try:
-        code = imported(tmp_path, text, words)
-    except SystemExit as end:  # of the parser of options
-        code = end.code
-    assert code == 2
+    assert of_text(text, words) is None
     printed = capsys.readouterr().err
     assert re.search(f"error: .*{message}", printed), printed
     assert printed.count("error:") == 1
-    assert not (tmp_path / "shown.npz").exists()
 
 
 LONG = "run,time,a,b,x,y,c\n" + "".join(
@@ -215,63 +226,55 @@ LONG = "run,time,a,b,x,y,c\n" + "".join(
 OF_LONG = ("--joints=b,a", "--outcome=x", "--context=c", "--recording=run")
 
 
-def test_a_folder_is_a_recording_for_each_file_in_the_order_of_their_names(tmp_path):
+def test_a_folder_is_a_recording_for_each_file_in_the_order_of_their_names():
     for name, text in (("b", ONE), ("a", ONE.replace("0.7", "0.1"))):
-        (tmp_path / f"{name}.csv").write_text(text)
-    (tmp_path / "notes.txt").write_text("none of them")
-    assert sgimd("import", tmp_path, *NAMED.split(), "--out", tmp_path / "shown.npz") == 0
-    assert [demonstration.outcome[0] for demonstration in load_demonstrations(tmp_path / "shown.npz")] == [0.1, 0.7]
+        Path(f"{name}.csv").write_text(text)
+    Path("notes.txt").write_text("none of them")
+    assert [demonstration.outcome[0] for demonstration in imported(".", *NAMED.split())] == [0.1, 0.7]
 
 
-def test_recordings_of_a_file_of_ours_are_mended_too(tmp_path):
+def test_recordings_of_a_file_of_ours_are_mended_too():
     times = np.arange(30) / 10
     joints = np.rad2deg(np.clip(times - 1, 0, 1))[:, None]
-    save_demonstrations(tmp_path / "deg.npz", [Demonstration(np.zeros(0), times, joints, np.zeros(2))])
-    words = ("--unit", "deg", "--trim", "--speed", 2)
-    assert sgimd("import", tmp_path / "deg.npz", *words, "--out", tmp_path / "shown.npz") == 0
-    (shown,) = load_demonstrations(tmp_path / "shown.npz")
+    save_demonstrations("deg.npz", [Demonstration(np.zeros(0), times, joints, np.zeros(2))])
+    (shown,) = imported("deg.npz", "--unit", "deg", "--trim", "--speed", 2)
     np.testing.assert_allclose(shown.times, np.arange(11) / 20, atol=1e-12)
     np.testing.assert_allclose(shown.trajectory[[0, -1], 0], [0, 1], atol=1e-12)
 
 
-def test_one_long_table_is_cut_where_the_recording_changes(tmp_path, capsys):
-    table = tmp_path / "long.csv"
-    table.write_text(LONG)
-    assert sgimd("import", table, *OF_LONG, "--out", tmp_path / "shown.npz") == 0
-    one, two = load_demonstrations(tmp_path / "shown.npz")
+def test_one_long_table_is_cut_where_the_recording_changes(capsys):
+    Path("long.csv").write_text(LONG)
+    one, two = imported("long.csv", *OF_LONG)
     assert one.trajectory[:, 0].tolist() == [0, -1, -2, -3]
     assert (one.outcome.tolist(), two.outcome.tolist()) == ([0.0], [1.0])
     assert one.context.tolist() == [5.0]  # of the first row
-    table.write_text(LONG + "one,9,9,9,9,9,9\n")
-    assert sgimd("import", table, *OF_LONG, "--out", tmp_path / "shown.npz") == 2
+    Path("long.csv").write_text(LONG + "one,9,9,9,9,9,9\n")
+    assert imported("long.csv", *OF_LONG) is None
     assert "the rows of recording one are not adjacent; sort them by run and time" in capsys.readouterr().err
 
 
-def test_recordings_that_cannot_be_used_are_named_and_left_out_when_asked(tmp_path, capsys):
-    (tmp_path / "long.csv").write_text(LONG.replace("two,0.2,2", "two,0.2,?"))
-    words = ("import", tmp_path / "long.csv", *OF_LONG, "--out", tmp_path / "shown.npz")
-    assert sgimd(*words) == 2
+def test_recordings_that_cannot_be_used_are_named_and_left_out_when_asked(capsys):
+    Path("long.csv").write_text(LONG.replace("two,0.2,2", "two,0.2,?"))
+    assert imported("long.csv", *OF_LONG) is None
     fault = "long.csv: run two: row 8: a is '?', no number; is a field missing?"
     printed = capsys.readouterr().err
-    assert f"1 of 2 recordings of {tmp_path / 'long.csv'} cannot be used; the first is {fault}" in printed
+    assert f"1 of 2 recordings of long.csv cannot be used; the first is {fault}" in printed
     assert "--skip-unusable leaves such out" in printed
-    assert not (tmp_path / "shown.npz").exists()
-    assert sgimd(*words, "--skip-unusable") == 0
+    assert len(imported("long.csv", *OF_LONG, "--skip-unusable")) == 1
     assert f"left out {fault}" in capsys.readouterr().err
-    assert len(load_demonstrations(tmp_path / "shown.npz")) == 1
-    (tmp_path / "long.csv").write_text(LONG.replace("run,time", "run,t"))
-    assert sgimd(*words, "--skip-unusable") == 2  # none is left
+    Path("long.csv").write_text(LONG.replace("run,time", "run,t"))
+    assert imported("long.csv", *OF_LONG, "--skip-unusable") is None  # none is left
 
 
-def test_folders_without_texts_and_places_without_a_file_are_refused(tmp_path, capsys):
-    os.mkfifo(tmp_path / "pipe.npz")
+def test_folders_without_texts_and_places_without_a_file_are_refused(capsys):
+    os.mkfifo("pipe.npz")
     for place, message in (
         (".", r"holds no \.csv, \.tsv, \.txt, \.dat file"),
         ("no.csv", r"no\.csv cannot be read or written: No such file"),
-        ("\udcff\x1b[31m\n.csv", r"'.*\\udcff\\x1b\[31m\\n\.csv' cannot be read or written: No such file"),
+        ("\udcff\x1b[31m\n.csv", r"'\\udcff\\x1b\[31m\\n\.csv' cannot be read or written: No such file"),
         ("pipe.npz", "pipe.npz is a pipe or a device, not a file"),
     ):
-        assert sgimd("import", tmp_path / place, *NAMED.split(), "--out", tmp_path / "shown.npz") == 2
+        assert imported(place, *NAMED.split()) is None
         printed = capsys.readouterr().err
         assert re.fullmatch(f"error: .*{message}.*\n", printed), printed
 
@@ -292,9 +295,9 @@ FEATURES = {
 
 
 @pytest.fixture(params=["v3.0", "v2.1"])
-def dataset(request, tmp_path):
+def dataset(request):
     """Three episodes in the layout of LeRobot: in two files of v3, or in three of v2.1."""
-    root, v3 = tmp_path / "arm", request.param == "v3.0"
+    root, v3 = DATASET, request.param == "v3.0"
     info = {"codebase_version": request.param, "total_episodes": 3, "total_frames": 15, "features": FEATURES}
     for folder in ("meta", "data/chunk-000"):
         (root / folder).mkdir(parents=True)
@@ -313,35 +316,30 @@ def dataset(request, tmp_path):
     return root
 
 
-def of_dataset(dataset, joints, outcome=PLACE, *words):
-    """The demonstrations that an import of a dataset writes; None if it is refused."""
-    out = dataset / "shown.npz"
-    out.unlink(missing_ok=True)
-    code = sgimd("import", dataset, "--joints", joints, "--outcome", outcome, *words, "--out", out)
-    assert (code == 0) == out.exists()
-    return load_demonstrations(out) if code == 0 else None
+def of_dataset(joints, outcome=PLACE, *words):
+    return imported(DATASET, "--joints", joints, "--outcome", outcome, *words)
 
 
 def test_a_lerobot_dataset_is_a_recording_for_each_episode(dataset, capsys):
-    shown = of_dataset(dataset, f"{STATE}[0:2]", f"{PLACE}[1],{PLACE}[0]")
+    shown = of_dataset(f"{STATE}[0:2]", f"{PLACE}[1],{PLACE}[0]")
     assert [demonstration.outcome.tolist() for demonstration in shown] == [[0.0, 4.0], [0.5, 4.0], [1.0, 4.0]]
     assert shown[2].trajectory.tolist() == [[2.0, frame / 8] for frame in range(5)]
     np.testing.assert_allclose(shown[1].times, np.arange(5) / 10, atol=1e-7)
     assert "3 recordings, 2 joints" in capsys.readouterr().out
-    assert of_dataset(dataset, STATE)[0].trajectory.shape == (5, 3)  # all entries of a vector are its bare name
+    assert of_dataset(STATE)[0].trajectory.shape == (5, 3)  # all entries of a vector are its bare name
 
 
 def test_entries_of_a_dataset_have_names(dataset):
-    assert of_dataset(dataset, "lift.pos,pan.pos")[2].trajectory[1].tolist() == [1 / 8, 2.0]  # of the state
-    assert of_dataset(dataset, "grip", "y")[1].outcome.tolist() == [0.5]
+    assert of_dataset("lift.pos,pan.pos")[2].trajectory[1].tolist() == [1 / 8, 2.0]  # of the state
+    assert of_dataset("grip", "y")[1].outcome.tolist() == [0.5]
 
 
 def test_robots_that_record_shares_of_ranges_must_say_their_units(dataset, capsys):
     change(dataset, robot_type="so101_follower")
     for words in ((), ("--unit", "gripper=deg")):
-        assert of_dataset(dataset, STATE, PLACE, *words) is None
+        assert of_dataset(STATE, PLACE, *words) is None
         assert "a robot so101_follower records degrees or shares" in capsys.readouterr().err
-    (first, *_) = of_dataset(dataset, STATE, PLACE, "--unit", "rad,gripper=deg")
+    (first, *_) = of_dataset(STATE, PLACE, "--unit", "rad,gripper=deg")
     np.testing.assert_allclose(first.trajectory[1], [0, 1 / 8, np.deg2rad(7)])
 
 
@@ -405,13 +403,13 @@ HARMS = {
 def test_a_dataset_that_is_damaged_or_of_another_kind_is_refused(dataset, capsys, joints, harm, message):
     if harm is not None:
         harm(dataset)
-    assert of_dataset(dataset, joints) is None
+    assert of_dataset(joints) is None
     assert re.search(f"error: .*{message}", capsys.readouterr().err)
 
 
 def test_a_file_of_a_dataset_names_its_folder(dataset, capsys):
-    assert sgimd("import", last(dataset), "--joints", STATE, "--outcome", PLACE, "--out", dataset / "shown.npz") == 2
-    assert f"is one file of a LeRobot dataset; name the dataset instead: {dataset}" in capsys.readouterr().err
+    assert imported(last(dataset), "--joints", STATE, "--outcome", PLACE) is None
+    assert f"one file of a LeRobot dataset; name the dataset instead: {dataset.absolute()}\n" in capsys.readouterr().err
 
 
 def bent(angle, outcome=(0.0, 0.0)):
@@ -425,20 +423,20 @@ def landing(angle):
     return ARM.execute(np.zeros(0), theta, np.random.default_rng(0))
 
 
-def test_check_prints_where_recordings_land_and_names_those_that_cannot_be_used(tmp_path, capsys, monkeypatch):
-    words = ("check", tmp_path / "shown.npz", "--environment", "planar-arm-7")
-    save_demonstrations(words[1], [bent(0.1, landing(0.1)), bent(0.3, [0.5, 0.5])])
+def test_check_prints_where_recordings_land_and_names_those_that_cannot_be_used(capsys, monkeypatch):
+    words = ("check", SHOWN, "--environment", "planar-arm-7")
+    save_demonstrations(SHOWN, [bent(0.1, landing(0.1)), bent(0.3, [0.5, 0.5])])
     assert sgimd(*words) == 0
     printed = capsys.readouterr().out.splitlines()
     assert [line.split()[:2] for line in printed[1:3]] == [["0", "1"], ["1", "1"]]
     assert "0.000" in printed[1]
     assert f"{np.linalg.norm(landing(0.3) - 0.5):.3f}" in printed[2]
     assert printed[-1].startswith("2 of 2 can be used; they land")
-    save_demonstrations(words[1], [bent(0.1, landing(0.1)), bent(np.rad2deg(0.8))])
+    save_demonstrations(SHOWN, [bent(0.1, landing(0.1)), bent(np.rad2deg(0.8))])
     assert sgimd(*words) == 2
     printed = capsys.readouterr()
     assert "cannot be used: the first joint turns within" in printed.out
-    assert re.search("error: 1 of 2 recordings of .*shown.npz cannot be used; the first is 1: .* in deg", printed.err)
+    assert re.search("error: 1 of 2 recordings of shown.npz cannot be used; the first is 1: .* in deg", printed.err)
 
     def execute(self, context, theta, rng):
         raise failures.pop(0)
@@ -451,14 +449,14 @@ def test_check_prints_where_recordings_land_and_names_those_that_cannot_be_used(
 
 
 @pytest.mark.parametrize(("factor", "unit"), [(1e3, "ms"), (1e6, "us"), (1e9, "ns"), (1, None)])
-def test_times_in_another_unit_are_suspected_on_a_robot_of_any_speed(tmp_path, capsys, factor, unit):
+def test_times_in_another_unit_are_suspected_on_a_robot_of_any_speed(capsys, factor, unit):
     shown = bent(0.1, landing(0.1))
-    save_demonstrations(tmp_path / "shown.npz", [dataclasses.replace(shown, times=factor * shown.times)])
-    assert sgimd("check", tmp_path / "shown.npz", "--environment", "planar-arm-7") == 0
+    save_demonstrations(SHOWN, [dataclasses.replace(shown, times=factor * shown.times)])
+    assert sgimd("check", SHOWN, "--environment", "planar-arm-7") == 0
     said = f"lasts {factor:.2g} s, with {factor / 5:.2g} s between samples; are its times in {unit}?"
     assert (said in capsys.readouterr().out) == (unit is not None)
     words = "--environment planar-arm-7 --algorithm observation --movements 5 --evaluate-at [] --demonstrations"
-    assert sgimd(*words.split(), tmp_path / "shown.npz", "--out", tmp_path, view="run") == 0
+    assert sgimd(*words.split(), SHOWN, "--out", ".", view="run") == 0
     assert (f"recording 0 {said}" in capsys.readouterr().err) == (unit is not None)
 
 
@@ -504,55 +502,56 @@ class Slow(PlanarArm):
 SHARES = "grip.pos,turn,b\n" + "".join(f"{100 * s},{100 - 200 * s},9\n" for s in np.linspace(0.2, 0.8, 11))
 
 
-def test_what_lies_outside_the_limits_of_speed_and_range_is_remarked(module, tmp_path, capsys):
+@pytest.fixture
+def servant(module):
+    module("my_servant", SERVANT)
+
+
+def test_what_lies_outside_the_limits_of_speed_and_range_is_remarked(servant, capsys):
     def recording(seconds, top, outcome=(0.2, 0.2)):
         times = np.linspace(0, seconds, 20)
         return Demonstration(np.zeros(0), times, np.stack([top * np.sin(times), 0 * times], axis=1), np.array(outcome))
 
-    module("my_servant", SERVANT)
-    words = ("check", tmp_path / "shown.npz", "--environment", "my_servant:Slow")
+    words = ("check", SHOWN, "--environment", "my_servant:Slow")
     shown = [recording(1.0, 0.5), recording(0.4, 0.5), recording(1.5, 2.0), recording(1.0, 0.5, (9, 9))]
-    save_demonstrations(words[1], shown)
+    save_demonstrations(SHOWN, shown)
     assert sgimd(*words) == 0
     fine, fast, wide, far, _ = capsys.readouterr().out.splitlines()[1:]
     assert float(fine.split()[-1]) < 0.01  # the misfit, and no remark
     assert "too fast: movements last 0.8 to 1.6 s" in fast
     assert re.search(r"joint 0 is 1.\d+ at sample 7, outside its range \[-1, 1\]", wide)
     assert "its outcome is outside T: a learner imitates it, but never takes it as a goal" in far
-    save_demonstrations(words[1], [recording(5.0, 0.5)])
+    save_demonstrations(SHOWN, [recording(5.0, 0.5)])
     assert sgimd(*words) == 2
     assert "a movement lasts 1.6 s at most, the recording 5 s" in capsys.readouterr().out
 
 
-def of_servant(tmp_path, module, texts, *words, robot="Servant"):
-    module("my_servant", SERVANT)
-    (tmp_path / "logs").mkdir(exist_ok=True)
+def of_servant(texts, *words, robot="Servant"):
+    Path("logs").mkdir(exist_ok=True)
     for number, text in enumerate(texts):
-        (tmp_path / f"logs/{number}.csv").write_text(text)
-    robot = ("--environment", f"my_servant:{robot}", "--rate", 10)
-    code = sgimd("import", tmp_path / "logs", *robot, *words, "--out", tmp_path / "shown.npz")
-    return load_demonstrations(tmp_path / "shown.npz") if code == 0 else None
+        Path(f"logs/{number}.csv").write_text(text)
+    return imported("logs", "--environment", f"my_servant:{robot}", "--rate", 10, *words)
 
 
-def test_shares_of_ranges_become_angles_of_the_robot_and_its_movement_gives_the_outcome(tmp_path, module, capsys):
+def test_shares_of_ranges_become_angles_of_the_robot_and_its_movement_gives_the_outcome(servant, capsys):
     words = ("--joints", "turn,grip.pos", "--unit=-100:100,grip=0:100")
-    (shown,) = of_servant(tmp_path, module, [SHARES], *words)
+    (shown,) = of_servant([SHARES], *words)
     np.testing.assert_allclose(shown.trajectory[[0, -1]], [[0.6, 0.8], [-0.6, 3.2]], atol=1e-12)
     np.testing.assert_allclose(shown.outcome, [-0.6, 3.2], atol=0.05)  # where the translated movement ends
     assert "1 of 1 can be used; they land 0.000 (median)" in capsys.readouterr().out
-    (shown,) = of_servant(tmp_path, module, [SHARES], *words, robot="Replays")
+    (shown,) = of_servant([SHARES], *words, robot="Replays")
     np.testing.assert_allclose(shown.outcome, [0.4, 4.2])  # of the replay, which lasts 1 s
-    (shown,) = of_servant(tmp_path, module, [SHARES], *words, robot="Halves")
+    (shown,) = of_servant([SHARES], *words, robot="Halves")
     np.testing.assert_allclose(shown.outcome, [-0.3, 1.6], atol=0.05)  # the replay is that of another robot
-    assert of_servant(tmp_path, module, [SHARES], "--joints", "turn", "--unit=-100:100") is None
+    assert of_servant([SHARES], "--joints", "turn", "--unit=-100:100") is None
     assert "the robot has 2 joints, the recordings have 1: turn" in capsys.readouterr().err
 
 
-def test_joints_have_the_names_of_the_robots_joints_unless_they_are_named(tmp_path, module, capsys):
+def test_joints_have_the_names_of_the_robots_joints_unless_they_are_named(servant, capsys):
     text = SHARES.replace("grip.pos", "grip")
-    (shown,) = of_servant(tmp_path, module, [text], "--unit=-100:100,grip=0:100")
+    (shown,) = of_servant([text], "--unit=-100:100,grip=0:100")
     np.testing.assert_allclose(shown.trajectory[-1], [-0.6, 3.2], atol=1e-12)
-    assert of_servant(tmp_path, module, [text]) is None
+    assert of_servant([text]) is None
     assert "turn reads up to 60 in 0.csv, more than a turn in rad" in capsys.readouterr().err
 
 
@@ -564,22 +563,22 @@ RISE = list(np.sin(np.linspace(-1, 1, 12)))
 SHAKEN = [0.9] * 4 + [-0.9, 0.9, -0.9, 0.9, -0.9, 0.9] + [-0.9] * 4
 
 
-def test_what_a_robot_cannot_repeat_is_never_written(tmp_path, module, capsys):
+def test_what_a_robot_cannot_repeat_is_never_written(servant, capsys):
     texts = [turning(*angles) for angles in (RISE, SHAKEN, RISE[:2], RISE * 2, [9 * x for x in RISE])]
-    assert of_servant(tmp_path, module, texts, "--unit", "rad") is None
+    assert of_servant(texts, "--unit", "rad") is None
     printed = capsys.readouterr()
     faults = ("with a jerk", "0.1 s, movements at least 0.5 s", "2 s at most", "in degrees")
     for number, fault in enumerate(faults, 1):
         assert re.search(rf"\n{number}\.csv .* cannot be used: .*{fault}", printed.out), printed.out
     assert "4 of 5 recordings of" in printed.err
-    assert len(of_servant(tmp_path, module, texts, "--unit", "rad", "--skip-unusable")) == 1
+    assert len(of_servant(texts, "--unit", "rad", "--skip-unusable")) == 1
     assert capsys.readouterr().err.count("left out ") == 4
 
 
 @pytest.mark.parametrize(("words", "lasts"), [(("--trim",), 1.1), (("--speed", 3), 1.7)])
-def test_a_recording_that_lasts_too_long_is_mended_when_asked(tmp_path, module, capsys, words, lasts):
+def test_a_recording_that_lasts_too_long_is_mended_when_asked(servant, capsys, words, lasts):
     texts = [turning(*[RISE[0]] * 20, *RISE, *[RISE[-1]] * 20)]
-    assert of_servant(tmp_path, module, texts) is None
+    assert of_servant(texts) is None
     assert "a movement lasts 2 s at most, the recording 5.1 s" in capsys.readouterr().err
-    (shown,) = of_servant(tmp_path, module, texts, *words)
+    (shown,) = of_servant(texts, *words)
     assert shown.times[[0, -1]] == pytest.approx([0, lasts])

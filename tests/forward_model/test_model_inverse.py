@@ -146,13 +146,16 @@ def test_all_parts_share_the_model_that_the_first_has_made(memory):
     assert proved.model.members == 2
 
 
-def lived(outcome_of, n, scale=1.0, noise=0.1, **options):
-    """A `ProvedModel` after ``n`` random movements; its model was refreshed after each."""
+def lived(outcome_of, n, scale=1.0, noise=0.1, asked=None, **options):
+    """A `ProvedModel` after ``n`` random movements; its model was refreshed after each, and ``asked`` are goals that it
+    was asked for now and then."""
     problem, rng = Problem(boxes(Box.cube(0.0, 1.0, 3), scale * noise), 0, inverse=NearestNeighbour), stream(0, "lived")
     proved = ProvedModel(problem, **options)
     for theta in rng.random((n, 3)):
         problem.memory.add(NO_CONTEXT, theta, scale * outcome_of(theta, rng))
         proved.model.refresh(problem.memory)
+        if asked is not None and len(problem.memory) % 70 == 0:
+            answers(proved, asked)
     return proved
 
 
@@ -171,11 +174,10 @@ def proved():
 
 
 @pytest.mark.parametrize("trusted", [False, True])
-def test_the_model_answers_if_it_predicts_as_well_as_the_process_after_enough_tests(proved, trusted):
+def test_the_model_answers_if_it_predicts_as_well_as_the_process(proved, trusted):
     inverse = proved if trusted else lived(smooth, 500, rate=0.1)
     assert inverse.model_inverse.trusted  # by its relative error alone
     assert inverse.trusted is trusted
-    assert not lived(noisy, 150).trusted  # too few tests
     goals = inverse.problem.memory.outcomes[:3] + 0.01
     np.testing.assert_array_equal(
         answers(inverse, goals), answers(inverse.model_inverse if trusted else inverse.process, goals)
@@ -184,23 +186,16 @@ def test_the_model_answers_if_it_predicts_as_well_as_the_process_after_enough_te
     assert uses_model(inverse.process, inverse.model)
 
 
-def test_told_that_nothing_is_noisy_it_wants_better_predictions(proved):
+def test_it_wants_enough_tests_and_better_predictions_where_nothing_is_noisy(proved):
     assert proved.trusted
+    assert not lived(noisy, 150).trusted
     assert not lived(noisy, 600, noise=0.0).trusted
 
 
-def test_answers_do_not_change_what_is_proved(goals):
-    asked, silent = lived(noisy, 100), lived(noisy, 100)
-    rng = stream(5, "more")
-    for theta in rng.random((500, 3)):
-        outcome = noisy(theta, rng)
-        for proved in (asked, silent):
-            proved.problem.memory.add(NO_CONTEXT, theta, outcome)
-            proved.model.refresh(proved.problem.memory)
-        if len(asked.problem.memory) % 70 == 0:
-            answers(asked, goals)
-    assert asked.trusted == silent.trusted
-    np.testing.assert_array_equal(answers(asked, goals), answers(silent, goals))
+def test_answers_do_not_change_what_is_proved(proved, goals):
+    asked = lived(noisy, 600, asked=goals)
+    assert asked.trusted == proved.trusted
+    np.testing.assert_array_equal(answers(asked, goals), answers(proved, goals))
 
 
 def test_in_thousandths_of_the_unit_it_trusts_and_answers_the_same(proved):

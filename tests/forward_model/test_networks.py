@@ -51,15 +51,6 @@ def test_one_pass_of_all_members_is_a_pass_of_each(shape):
         torch.testing.assert_close(log_variances[member], log_variance)  # between the bounds, for these
 
 
-def test_every_member_starts_from_other_weights_and_all_come_from_the_generator():
-    before = torch.random.get_rng_state()
-    weights = [[*ensemble(seed).networks.weights] for seed in (0, 0, 1)]
-    assert all(torch.equal(one, same) for one, same in zip(*weights[:2], strict=True))
-    assert not any(torch.equal(one, other) for one, other in zip(weights[0], weights[2], strict=True))
-    assert not torch.equal(weights[0][0][0], weights[0][0][1])
-    assert torch.equal(torch.random.get_rng_state(), before)
-
-
 def test_a_member_learns_from_its_own_batch_only():
     networks, inputs, outputs = ensemble(), random(MEMBERS, 6, 4), random(MEMBERS, 6, 2)
 
@@ -200,15 +191,20 @@ def test_own_networks_learn_standardised_or_in_units_with_a_noise_or_without(kin
         np.testing.assert_allclose(torch.stack(means).mean(dim=0), mean, atol=1e-5)
 
 
-def test_a_module_is_copied_with_its_weights_and_members_of_a_class_differ():
+def test_a_module_is_copied_with_its_weights():
     net = Own(1, 3, 2)
     copies = ensemble(network=net).networks.members
     assert all(torch.equal(one.layer.weight, net.layer.weight) and one is not net for one in copies)
+
+
+@pytest.mark.parametrize("own", [{}, {"network": Own}])
+def test_every_member_starts_from_other_weights_and_all_come_from_the_seed(own):
     before = torch.random.get_rng_state()
-    first, same, other = (ensemble(seed, network=Own).networks.members for seed in (0, 0, 1))
-    assert torch.equal(first[0].layer.weight, same[0].layer.weight)
-    assert not torch.equal(first[0].layer.weight, first[1].layer.weight)
-    assert not torch.equal(first[0].layer.weight, other[0].layer.weight)
+    networks = [ensemble(seed, **own).networks for seed in (0, 0, 1)]
+    first, same, other = ([net.layer.weight for net in nets.members] if own else nets.weights[0] for nets in networks)
+    assert all(map(torch.equal, first, same))
+    assert not any(map(torch.equal, first, other))
+    assert not torch.equal(first[0], first[1])
     assert torch.equal(torch.random.get_rng_state(), before)
 
 

@@ -12,13 +12,16 @@ import pytest
 import torch
 
 from boards import curves_of
+from models import ARM, problem_of
 from runs import ROOT, about_of, content_of, write_about
+from sgimd_torch.board import listener
 from sgimd_torch.board.legend import LEGEND
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.forward_model.checkpoints import Checkpoints
 from sgimd_torch.forward_model.model import ForwardModel
 from sgimd_torch.forward_model.shared import ModelListener
+from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.memory import Memory
 from sgimd_torch.options.build import build
 from sgimd_torch.options.catalogue import WORDS
@@ -46,17 +49,28 @@ def live(tmp_path_factory):
     short = f"--algorithm sgim-d --environment planar-arm-7 --seed 3 --movements {MOVEMENTS} --evaluate_at 120"
 
     def live(out, *options):
-        words = (*short.split(), "--repeats", 0, "--benchmark", path, "--out", out, *options)
+        words = (*short.split(), "--repeats", 0, "--benchmark", path, "--board", "true", "--out", out, *options)
         assert command(main, [str(word) for word in words]) == 0
         return out / "sgim-d" / "seed-003"
 
-    return live
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(listener, "maps_of", lambda *_: {})  # pictures take longer than all movements
+        yield live
 
 
 @pytest.fixture(scope="module")
 def reference(tmp_path_factory, live):
-    """Directory of a whole run that searches and answers through the model, and is watched."""
-    return live(tmp_path_factory.mktemp("model"), *MODEL, "--board", "true")
+    """Directory of a whole run that searches and answers through the model."""
+    return live(tmp_path_factory.mktemp("guided"), *MODEL)
+
+
+ALONE = ("--inverse", "model-alone", "--checkpoints", "true", "--evaluate-at", "60,120")
+
+
+@pytest.fixture(scope="module")
+def unguided(tmp_path_factory, live):
+    """Directory of a whole run that learns without the model and answers evaluations by it."""
+    return live(tmp_path_factory.mktemp("unguided"), *ALONE)
 
 
 def table(directory, name):
@@ -91,24 +105,28 @@ def test_every_refresh_is_recorded(reference):
     assert read_run(reference).summary["seconds_model"] > 0
 
 
-def test_a_run_made_longer_equals_a_long_run_and_so_does_its_board(tmp_path, live, reference):
-    watched = (*MODEL, "--board", "true")
-    directory = live(tmp_path, *watched, "--movements", 120)
+@pytest.mark.parametrize(
+    ("long_run", "options", "begun"),
+    [
+        ("reference", MODEL, MODEL),
+        ("unguided", ALONE, ALONE),
+        ("unguided", ALONE, (*ALONE[:-1], "120")),  # its evaluation at 60 needs the model of that moment
+    ],
+)
+def test_a_run_made_longer_equals_a_long_run_and_so_do_its_board_and_checkpoints(
+    tmp_path, live, request, long_run, options, begun
+):
+    whole = request.getfixturevalue(long_run)
+    directory = live(tmp_path, *begun, "--movements", 120)
     assert table(directory, "predictions")[1][:, 0].tolist() == list(range(50, 100))
-    live(tmp_path, *watched, "--resume")
-    assert content_of(directory) == content_of(reference)
-    resumed, whole = curves_of(directory), curves_of(reference)
-    assert {tag for tag in whole if tag.startswith("model/")} == TAGS
-    assert {tag: resumed[tag] for tag in TAGS} == {tag: whole[tag] for tag in TAGS}
-
-
-ALONE = ("--inverse", "model-alone", "--board", "true", "--checkpoints", "true", "--evaluate-at", "60,120")
-
-
-@pytest.fixture(scope="module")
-def unguided(tmp_path_factory, live):
-    """Directory of a whole run that learns without the model and answers evaluations by it."""
-    return live(tmp_path_factory.mktemp("unguided"), *ALONE)
+    live(tmp_path, *options, "--resume")
+    assert content_of(directory) == content_of(whole)
+    resumed, curves = curves_of(directory), curves_of(whole)
+    assert {tag for tag in curves if tag.startswith("model/")} == TAGS
+    assert {tag: resumed[tag] for tag in TAGS} == {tag: curves[tag] for tag in TAGS}
+    for name in ("000120", "000170", "last") if options is ALONE else ("last",):
+        one, other = (torch.load(at / "checkpoints" / f"{name}.ckpt") for at in (directory, whole))
+        assert str(one) == str(other)
 
 
 def model_at(directory, movements=None):
@@ -133,19 +151,6 @@ def test_a_replay_loads_the_checkpoint_of_its_moment_and_equals_one_that_trains(
         assert trained._online.moments is None
         assert all(map(torch.equal, loaded.state_dict().values(), trained.state_dict().values()))
         assert torch.equal(loaded._online.generator.get_state(), trained._online.generator.get_state())
-
-
-@pytest.mark.parametrize("evaluated", ["60,120", "120"])
-def test_a_run_made_longer_from_a_checkpoint_equals_a_long_run(tmp_path, live, unguided, evaluated):
-    wanted = (*ALONE[:-1], evaluated)
-    directory = live(tmp_path, *wanted, "--movements", 120)
-    live(tmp_path, *ALONE, "--resume")  # an evaluation that the first run has not made needs the model of its moment
-    assert content_of(directory) == content_of(unguided)
-    resumed, whole = curves_of(directory), curves_of(unguided)
-    assert {tag: resumed[tag] for tag in TAGS} == {tag: whole[tag] for tag in TAGS}
-    for name in ("000120", "000170", "last"):
-        one, other = (torch.load(at / "checkpoints" / f"{name}.ckpt") for at in (directory, unguided))
-        assert str(one) == str(other)
 
 
 def test_a_learner_that_the_model_has_guided_trains_it_again(reference):
@@ -185,19 +190,19 @@ def test_a_checkpoint_of_another_model_is_told_in_one_line_and_nothing_is_lost(
     assert model.relative_error == model_at(unguided).relative_error
 
 
-def test_checkpoints_without_a_model_are_refused(tmp_path, capsys):
-    assert command(main, ["--environment", "planar-arm-7", "--checkpoints", "true", "--out", str(tmp_path)]) == 2
-    assert "--checkpoints true needs a forward model" in capsys.readouterr().err
-    assert not list(tmp_path.iterdir())
-
-
 MISSING = ("--inverse.accelerator", "tpu")
 
 
-def test_a_missing_device_is_refused_before_the_first_movement(tmp_path, capsys):
-    words = ["--environment", "planar-arm-7", "--inverse", "model", *MISSING, "--out", str(tmp_path / "runs")]
-    assert command(main, words) == 2
-    assert "error: accelerator must be auto or cpu" in capsys.readouterr().err
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--checkpoints", "true"), "error: --checkpoints true needs a forward model"),
+        (("--inverse", "model", *MISSING), "error: accelerator must be auto or cpu"),
+    ],
+)
+def test_what_a_run_with_a_model_lacks_is_refused_before_the_first_movement(tmp_path, capsys, options, message):
+    assert command(main, ["--environment", "planar-arm-7", *options, "--out", str(tmp_path / "runs")]) == 2
+    assert message in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 
 
@@ -206,7 +211,7 @@ def elsewhere(tmp_path, reference):
     """Folder of the reference, as another machine would have made it: a function of its device and other settings."""
 
     def elsewhere(device, **settings):
-        directory = shutil.copytree(reference, tmp_path / reference.parent.name / reference.name)
+        directory = copied(reference, tmp_path)
         about = about_of(directory)
         settings = {**about["settings"], "inverse.accelerator": "tpu", **settings}
         write_about(directory, settings=settings, versions={**about["versions"], "device": device})
@@ -219,7 +224,7 @@ def test_a_record_of_a_missing_device_is_loaded_and_resumed_here_and_says_so(tmp
     directory = elsewhere("tpu")
     assert load_learner(directory).movements == MOVEMENTS
     assert "the CPU trains the forward model of this record: accelerator must be" in capsys.readouterr().err
-    live(tmp_path, *MODEL, *MISSING, "--board", "true", "--movements", MOVEMENTS + 1, "--resume")
+    live(tmp_path, *MODEL, *MISSING, "--movements", MOVEMENTS + 1, "--resume")
     said = capsys.readouterr().err
     assert "the CPU trains the forward model of this record" in said
     assert f"device tpu -> {about_of(directory)['versions']['device']}" in said
@@ -229,7 +234,7 @@ def test_a_record_of_a_missing_device_is_loaded_and_resumed_here_and_says_so(tmp
 def test_a_model_that_was_trained_elsewhere_may_differ_and_the_recorded_movements_count(elsewhere, reference):
     with pytest.warns(RuntimeWarning, match="another device or processor trained the forward model"):
         learner = load_learner(elsewhere("tpu", **{"inverse.rate": 1.9}))  # another rounding, exaggerated
-    np.testing.assert_array_equal(learner.memory.thetas, load_learner(reference).memory.thetas)
+    np.testing.assert_array_equal(learner.memory.thetas, read_run(reference).thetas)
 
 
 def test_a_model_that_differs_on_the_same_device_is_refused_with_what_differs(elsewhere, reference):
@@ -291,16 +296,17 @@ def listen(tmp_path):
     with Record.make(tmp_path / RUN_FILE, (0, 7, 2), {}) as record:
 
         def listen(n, before=lambda index, model: None):
-            model, memory, arm = ForwardModel(0, 7, 2, rate=1.0), Memory(0, 7, 2), PlanarArm(7)
-            listener = ModelListener(record, model, lambda: model.trusted, memory, Seconds({}), Checkpoints(tmp_path))
+            model, memory = ForwardModel(0, 7, 2, rate=1.0), Memory(0, 7, 2)
+            inverse, checkpoints = NearestNeighbour(problem_of(memory)), Checkpoints(tmp_path)
+            trains = ModelListener(record, model, inverse, memory, Seconds({}), checkpoints)
             rng, curves = stream(0, "exemplars"), []
             for index in range(n):
                 theta = rng.random(7)
-                memory.add(NO_CONTEXT, theta, arm.execute(NO_CONTEXT, theta, rng))
+                memory.add(NO_CONTEXT, theta, ARM.execute(NO_CONTEXT, theta, rng))
                 before(index, model)
                 move = Move(theta, np.full(2, index // 2), "local")
-                listener.episode(Episode(index, NO_CONTEXT, move, memory.outcomes[-1], None), replayed=False)
-                curves.append(listener.curves())
+                trains.episode(Episode(index, NO_CONTEXT, move, memory.outcomes[-1], None), replayed=False)
+                curves.append(trains.curves())
             return record, model, curves
 
         yield listen
@@ -335,17 +341,14 @@ def test_the_curves_are_those_of_the_newest_refresh(listen):
 
 
 def test_a_run_through_the_model_makes_one_of_the_size_of_its_robot_with_its_options():
-    networks = {"inverse.members": 2, "inverse.rate": 1.5, "inverse.noise_heads": False, "inverse.trust": 0.2}
-    networks |= {"inverse.widths": (8,), "inverse.activation": "tanh", "inverse.lr": 0.1, "inverse.batch": 5}
-    parts = {"search": "gradient", "inverse": "model", "environment": "fishing-rod", **networks}
+    options = {"members": 2, "rate": 1.5, "noise_heads": False, "trust": 0.2, "widths": (8,), "lr": 0.1, "batch": 5}
+    parts = {"search": "gradient", "inverse": "model", "environment": "fishing-rod"}
+    parts |= {f"inverse.{name}": value for name, value in options.items()}
     learner = build(Config(algorithm="sagg-riac", parts=parts)).learner
     (shared,) = learner.problem.trained
-    model = shared.model
-    assert model is learner.inverse.model
-    assert model.sizes == {"context_dim": 0, "theta_dim": 25, "outcome_dim": 2}
-    assert (model.members, model.rate, model.trust) == (2, 1.5, 0.2)
-    assert model.hparams.items() >= {"noise_heads": False, "activation": "tanh", "lr": 0.1, "batch": 5}.items()
-    assert [tuple(weight.shape) for weight in model.networks.weights] == [(2, 25, 8), (2, 8, 4)]
+    assert shared.model is learner.inverse.model
+    assert shared.model.hparams.items() >= {**options, "context_dim": 0, "theta_dim": 25, "outcome_dim": 2}.items()
+    assert [tuple(weight.shape) for weight in shared.model.networks.weights] == [(2, 25, 8), (2, 8, 4)]
     assert build(Config(parts={"search": "nelder-mead"})).learner.problem.trained == []
 
 
