@@ -16,8 +16,8 @@ import mujoco
 import numpy as np
 
 from sgimd_torch.environments.models.look import listed
-from sgimd_torch.environments.models.places import UNITS, joint_of, pulled
-from sgimd_torch.environments.models.posture import movable, nearest_posture, touching, within_ranges
+from sgimd_torch.environments.models.places import joint_of, movable, pulled
+from sgimd_torch.environments.models.posture import nearest_posture, touching, within_ranges
 from sgimd_torch.environments.models.servos import joints_to_serve, serve
 from sgimd_torch.files import check_regular
 from sgimd_torch.options.catalogue import unknown_name_error
@@ -103,8 +103,8 @@ def _load(path: Path, joints: Sequence[str], servos: str, keyframe: str, posture
             remarks.append(f"{path.name} has {cause}: position servos were made for {names}")
             if held > len(pulled(model)):
                 remarks.append("constraints to mocap bodies, which would hold the arm, were left out")
-        arm = [joint for k in range(model.nu) if (joint := joint_of(model, k)) is not None]
-        arm = sorted({joint for joint in arm if int(model.jnt_type[joint]) in UNITS})
+        acted = {joint_of(model, k) for k in range(model.nu)}
+        arm = [joint for joint in movable(model) if joint in acted]
         bodies = _robot(model, arm, alone=alone)
         model = _without(spec, model, _beside_base(model, bodies))
         keys = [model.key(k).name for k in range(model.nkey)]

@@ -13,16 +13,11 @@ import mujoco
 import numpy as np
 from scipy.optimize import minimize
 
-from sgimd_torch.environments.models.places import UNITS
+from sgimd_torch.environments.models.places import movable
 from sgimd_torch.spaces import Array
 
 NEAR: Final = 0.004  # m, distance of two geoms that counts as a contact while a posture is looked for
 _WEIGHTS: Final = (1e3, 1e5, 1e7)  # 1/m^2, growing weight of contacts against the way (rad or m) to a posture
-
-
-def movable(model: mujoco.MjModel) -> list[int]:
-    """Joints that turn or slide."""
-    return [k for k in range(model.njnt) if int(model.jnt_type[k]) in UNITS]
 
 
 def within_ranges(model: mujoco.MjModel, qpos: Array) -> Array:
