@@ -141,7 +141,7 @@ def test_a_floating_base_and_a_ball_joint_move_freely_and_a_joint_that_a_tendon_
 
 def test_a_place_that_moves_by_millimetres_keeps_every_promise(here):
     (here / "slow.xml").write_text(SLOW.replace('pos=".1 0 0"', 'pos=".003 0 0"'))
-    check_environment(MujocoRobot("slow.xml", outcome="site:rim:xy"))
+    check_environment(MujocoRobot("slow.xml", outcome="site:rim:xy", durations=(0.2, 0.4), settle=0.2))
 
 
 def test_a_thing_that_few_movements_reach_is_told(here):

@@ -75,7 +75,7 @@ def steady(*angles, pace=0.5, limits=LIMITS):
 @pytest.mark.parametrize(
     "options",
     [
-        {"outcome": "site:tip:xy", "noise": 0.01},
+        {"outcome": "site:tip:xy", "noise": 0.01, "durations": (0.3, 0.5)},
         {"outcome": "body:puck:xy", "context": "body:puck:x:.35:.45,body:puck:y:.2:.35", "threads": 2},
         {"outcome": "body:puck:yx,site:tip:x", "displacement": True, "keyframe": "bent"},
         {"outcome": "joint:elbow", "joints": ("elbow",), "n_knots": 6, "context": "joint:hinge:-.1:.1"},
@@ -135,7 +135,7 @@ def test_a_joint_that_was_not_chosen_holds_its_start_in_the_keyframe(here):
 
 
 def test_most_movements_end_in_the_task_space_that_was_found_and_a_remark_tells_it(here):
-    robot = MujocoRobot("arm.xml", outcome="site:tip:xy")
+    robot = MujocoRobot("arm.xml", outcome="site:tip:xy", durations=(0.3, 0.5))
     rngs = [stream(7, "x", k) for k in range(60)]
     ended = robot.execute_many(np.zeros((60, 0)), np.stack([robot.policies.sample(rng) for rng in rngs]), rngs)
     assert robot.outcomes.contains(ended).mean() > 0.85
@@ -203,7 +203,7 @@ def test_outcomes_are_located_in_the_world_from_where_the_movement_begins(here):
 
 
 def test_what_was_found_is_given_to_the_next_robot_which_makes_no_movement(here, monkeypatch):
-    options = {"model": "arm.xml", "outcome": "site:tip:xy", "noise": 0.01}
+    options = {"model": "arm.xml", "outcome": "site:tip:xy", "noise": 0.01, "durations": (0.2, 0.4), "settle": 0.1}
     first = MujocoRobot(**options)
     assert first.found_options.keys() == {*MujocoRobot.FOUND_OPTIONS}
     monkeypatch.setattr(MujocoRobot, "_simulate", lambda *_: pytest.fail("it moved"))
