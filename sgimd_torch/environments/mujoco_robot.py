@@ -19,7 +19,7 @@ from mujoco import rollout
 from numpy.typing import ArrayLike
 
 from sgimd_torch.environments.controllers import Controller
-from sgimd_torch.environments.models.file import file_of, files_of, load_model
+from sgimd_torch.environments.models.file import file_of, load_model
 from sgimd_torch.environments.models.look import NEARLY, SUNK, listed, missed, parts, reached
 from sgimd_torch.environments.models.places import (
     body_of,
@@ -146,7 +146,7 @@ class MujocoRobot:
         threads = check_count("threads", threads, 1, 1024)
         path = file_of(model)
         loaded = load_model(path, joints, servos, keyframe, posture)
-        self.model, self.remarks, self.files = loaded.model, loaded.remarks, files_of(path)
+        self.model, self.remarks, self.files = loaded.model, loaded.remarks, loaded.files
         self._longest, self._settle, self._displacement, self.noise = durations[1], settle, displacement, noise
         self._n_steps(self._longest)
         self._home, self._held = self._begin(loaded.start)
