@@ -84,7 +84,6 @@ class Caster:
         self._float_mass = float(model.body("float").mass[0])
         self._threads = os.cpu_count() or 1 if threads is None else threads
         self._pools: dict[int, tuple[rollout.Rollout, list[mujoco.MjData]]] = {}
-        self._rooms: dict[str, Array] = {}
         self.home, self.hanging = self._settle(posture)
         """Start configuration (a full physics state), and position (m) and velocity (m/s) ``(6,)`` of its float."""
 
@@ -108,7 +107,7 @@ class Caster:
         states, controls = self._begin([commands], np.array([wind]))
         run, seen = self._rollout(states, controls)
         outcome, landed, let_out = self._land(run[0], seen[0], end, wind)
-        states, floats = np.concatenate([states, run[0]]), seen[0].copy()
+        states, floats = np.concatenate([states, run[0]]), seen[0]
         n_steps = math.ceil(landed / self.timestep) + 1
         if n_steps > len(floats):
             held = np.repeat(controls[:, -1:], n_steps - len(floats), axis=1)
@@ -164,29 +163,19 @@ class Caster:
         return np.repeat(self.home[None], n, axis=0), controls
 
     def _rollout(self, states: Array, controls: Array) -> tuple[Array, Array]:
-        """States after each step; position and velocity of the float *before* each step, when MuJoCo reads its sensors.
-
-        The next call overwrites both arrays: allocating new arrays would take longer than all else in this class.
-        """
+        """States after each step; position and velocity of the float *before* each step, when MuJoCo reads its sensors."""
         threads = self._threads if len(states) > 1 else 1
         if threads not in self._pools:
             data = [mujoco.MjData(self.model) for _ in range(threads)]
             self._pools[threads] = (rollout.Rollout(nthread=threads if threads > 1 else 0), data)
         pool, data = self._pools[threads]
         n, n_steps = controls.shape[:2]
-        run = self._room("run", n, n_steps, states.shape[1])
-        seen = self._room("seen", n, n_steps, self.model.nsensordata)
+        run, seen = np.empty((n, n_steps, states.shape[1])), np.empty((n, n_steps, self.model.nsensordata))
         # MuJoCo's own checks and copies would take as long as four time steps; the shapes are right by construction.
         pool.rollout(
             [self.model] * n, data, states, controls, state=run, sensordata=seen, nstep=n_steps, skip_checks=True
         )
         return run, seen
-
-    def _room(self, name: str, *shape: int) -> Array:
-        size = math.prod(shape)
-        if name not in self._rooms or len(self._rooms[name]) < size:
-            self._rooms[name] = np.empty(size)
-        return self._rooms[name][:size].reshape(shape)
 
 
 def _damped(model: mujoco.MjModel) -> mujoco.MjModel:
