@@ -163,7 +163,7 @@ class Caster:
         return np.repeat(self.home[None], n, axis=0), controls
 
     def _rollout(self, states: Array, controls: Array) -> tuple[Array, Array]:
-        """States after each step; position and velocity of the float *before* each step, when MuJoCo reads its sensors."""
+        """States after each step; position and velocity of the float *before* each step, when sensors are read."""
         threads = self._threads if len(states) > 1 else 1
         if threads not in self._pools:
             data = [mujoco.MjData(self.model) for _ in range(threads)]

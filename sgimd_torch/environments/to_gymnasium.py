@@ -10,13 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from sgimd_torch.environments.from_gymnasium import gymnasium
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.spaces import Array, Box, check_point
-
-try:
-    import gymnasium
-except ImportError as error:
-    raise ImportError(f"this environment needs gymnasium: pip install 'sgimd-torch[gym]' ({error})") from error
 
 Observation = dict[str, Array]
 
