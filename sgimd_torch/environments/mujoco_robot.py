@@ -352,13 +352,11 @@ class MujocoRobot:
     def _simulate(self, contexts: Array, commands: Sequence[Array]) -> list[Array | None]:
         """States of each movement, the first one before its first step; None if the simulation diverged."""
         starts = np.stack([self.start_in(context) for context in contexts])
-        n_steps = [len(sequence) for sequence in commands]
-        controls = np.stack(
-            [np.pad(sequence, ((0, max(n_steps) - len(sequence)), (0, 0)), "edge") for sequence in commands]
-        )
+        longest = max(map(len, commands))
+        controls = np.stack([np.pad(one, ((0, longest - len(one)), (0, 0)), "edge") for one in commands])
         run, _ = self._pool.rollout(self.model, self._data, starts, controls)
         simulated = list[Array | None]()
-        for start, states, n in zip(starts, run, n_steps, strict=True):
+        for start, states, n in zip(starts, run, map(len, commands), strict=True):
             # A diverging simulation stops, or begins again at the time 0; the first entry of a state is its time.
             right = abs(states[n - 1, 0] - n * self.model.opt.timestep) < self.model.opt.timestep / 2
             simulated.append(np.concatenate([start[None], states[:n]]) if right else None)

@@ -30,16 +30,12 @@ class ToGymnasium(gymnasium.Env[Any, Any]):
 
     def __init__(self, environment: Environment) -> None:
         self.environment = environment
-        anywhere = gymnasium.spaces.Box(
-            -np.inf, np.inf, (environment.outcomes.dim,), np.float64
-        )  # outcomes may lie outside T
+        # Learners such as those of stable-baselines3 need an observation of at least one number.
+        contexts = environment.contexts if environment.contexts.dim else Box.cube(0.0, 1.0, 1)
+        anywhere = gymnasium.spaces.Box(-np.inf, np.inf, (environment.outcomes.dim,), np.float64)  # also outside T
+        goals = {"achieved_goal": anywhere, "desired_goal": _box(environment.outcomes)}
         self.observation_space: gymnasium.spaces.Dict[Any] = gymnasium.spaces.Dict(
-            {
-                # Learners such as those of stable-baselines3 need an observation of at least one number.
-                "observation": _box(environment.contexts if environment.contexts.dim else Box.cube(0.0, 1.0, 1)),
-                "achieved_goal": anywhere,
-                "desired_goal": _box(environment.outcomes),
-            }
+            {"observation": _box(contexts), **goals}
         )
         self.action_space: gymnasium.spaces.Box[Any] = _box(environment.policies)
         self._goal: Array | None = None

@@ -162,12 +162,8 @@ def commands_box(model: mujoco.MjModel, joints: Sequence[str], start: Array) -> 
             side = model.jnt_range[joint] if model.jnt_limited[joint] else np.array([-np.inf, np.inf])
             side = np.sort(side * model.actuator_gear[k, 0])
         turn = 2 * np.pi * abs(model.actuator_gear[k, 0])
-        if (
-            joint is not None
-            and UNITS.get(int(model.jnt_type[joint])) == "rad"
-            and is_servo(model, k)
-            and np.ptp(side) > turn
-        ):
+        turns = joint is not None and UNITS.get(int(model.jnt_type[joint])) == "rad" and is_servo(model, k)
+        if turns and np.ptp(side) > turn:
             low = np.clip(start[k] - turn / 2, side[0], side[1] - turn)
             side = np.array([low, low + turn])
             endless.append(names[k])

@@ -22,10 +22,9 @@ _WEIGHTS: Final = (1e3, 1e5, 1e7)  # 1/m^2, growing weight of contacts against t
 
 def within_ranges(model: mujoco.MjModel, qpos: Array) -> Array:
     """``(nq,)``, the nearest positions within the ranges of all joints."""
-    within = np.array(qpos)
-    for k in movable(model):
-        if model.jnt_limited[k]:
-            within[model.jnt_qposadr[k]] = np.clip(within[model.jnt_qposadr[k]], *model.jnt_range[k])
+    joints = [k for k in movable(model) if model.jnt_limited[k]]
+    within, places = np.array(qpos), model.jnt_qposadr[joints]
+    within[places] = np.clip(within[places], *model.jnt_range[joints].T)
     return within
 
 

@@ -67,16 +67,12 @@ def serve(
         spec.delete(spec.equalities[k])
     motors = dict[str, mujoco.MjsActuator]()
     for k, actuator in reversed([*enumerate(spec.actuators)]):
-        joint = joint_of(model, k)
-        if joint in chosen:
+        if joint_of(model, k) in chosen:
             if actuator.target in motors:
                 spec.delete(motors[actuator.target])
-            motors[actuator.target] = actuator
-            if (effort := _effort(model, k)) and not model.jnt_actfrclimited[joint]:
-                spec.joint(actuator.target).actfrcrange, spec.joint(actuator.target).actfrclimited = (
-                    [-effort, effort],
-                    1,
-                )
+            motors[actuator.target], joint = actuator, spec.joint(actuator.target)
+            if (effort := _effort(model, k)) and not model.jnt_actfrclimited[joint_of(model, k)]:
+                joint.actfrcrange, joint.actfrclimited = [-effort, effort], 1
     for name in names:
         spec.joint(name).actgravcomp = 1
     for key in spec.keys:  # its commands are those of motors
