@@ -6,7 +6,7 @@ check_environment(Toss())    # raises ValueError with a line for each broken pro
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -44,7 +44,7 @@ def check_environment(environment: Environment, *, movements: int = 3) -> list[s
     check_count("movements", movements, 1)
     if isinstance(environment, type):
         check_instance(environment)
-    stages: list[tuple[Callable[..., Iterator[str]], ...]] = [(_spaces,), (_contexts,), (_outcomes,), (_repeats,)]
+    stages: list[tuple[Callable[..., Iterable[str]], ...]] = [(_spaces,), (_contexts,), (_outcomes,), (_repeats,)]
     stages.append((_noise, _batches, _refusals))
     findings: list[str] = []
     tried: Movements = ()
@@ -52,7 +52,7 @@ def check_environment(environment: Environment, *, movements: int = 3) -> list[s
         for promise in stage:
             try:
                 findings += promise(environment, tried)
-            except _RaisedError as error:
+            except _BrokenError as error:
                 findings.append(str(error))
         if broken := [finding for finding in findings if not isinstance(finding, _Remark)]:
             raise ValueError("\n  ".join([f"{type(environment).__name__} is no environment yet:", *broken]))
@@ -61,8 +61,8 @@ def check_environment(environment: Environment, *, movements: int = 3) -> list[s
     return findings
 
 
-class _RaisedError(Exception):
-    """A method of the environment raised an exception where none is allowed."""
+class _BrokenError(Exception):
+    """A broken promise without which the rest of a check makes no sense."""
 
 
 def _movements(environment: Environment, n: int) -> Movements:
@@ -99,9 +99,7 @@ def _spaces(environment: Environment, _: Movements) -> Iterator[str]:
 def _contexts(environment: Environment, _: Movements) -> Iterator[str]:
     before = _global_streams()
     context = _call(environment, "observe", stream(1, "observe"))
-    if (wrong := _misshapen("observe()", context, environment.contexts.dim)) is not None:
-        yield wrong
-        return
+    _check_shape("observe()", context, environment.contexts.dim)
     kept = context.copy()
     if not environment.contexts.contains(context):
         yield f"observe() gave {_text(context)}, outside C (contexts); contexts.sample(rng) gives points inside"
@@ -114,20 +112,19 @@ def _contexts(environment: Environment, _: Movements) -> Iterator[str]:
         yield _drew_from_global("observe()")
 
 
-def _outcomes(environment: Environment, tried: Movements) -> Iterator[str]:
+def _outcomes(environment: Environment, tried: Movements) -> list[str]:
     for context, theta in tried:
         arguments = context.copy(), theta.copy()
         outcome = _call(environment, "execute", *arguments, stream(1, "execute"))
-        if (wrong := _misshapen("execute()", outcome, environment.outcomes.dim)) is not None:
-            yield wrong
-            return
+        _check_shape("execute()", outcome, environment.outcomes.dim)
         if not np.isfinite(outcome).all():
-            yield f"execute() gave {_text(outcome)} for theta {_text(theta)}; raise SimulationError if it diverges"
-            return
+            gave = f"execute() gave {_text(outcome)} for theta {_text(theta)}"
+            raise _BrokenError(f"{gave}; raise SimulationError if it diverges")
         for name, given, now in zip(("context", "theta"), (context, theta), arguments, strict=True):
             if not np.array_equal(given, now):
-                yield f"execute() changed the {name} that it was given; write x = x * 2 instead of x *= 2"
-                return
+                slip = f"execute() changed the {name} that it was given"
+                raise _BrokenError(f"{slip}; write x = x * 2 instead of x *= 2")
+    return []
 
 
 def _repeats(environment: Environment, tried: Movements) -> Iterator[str]:
@@ -139,12 +136,10 @@ def _repeats(environment: Environment, tried: Movements) -> Iterator[str]:
     first = _call(environment, "execute", context, theta, rng)
     kept, again = first.copy(), _call(environment, "execute", context, theta, stream(1, "execute")).copy()
     if _global_streams() != before:
-        yield _drew_from_global("execute()")
-        return
+        raise _BrokenError(_drew_from_global("execute()"))
     seen = f"execute() gave {_text(kept)}, then {_text(again)} for the same movement and equal streams"
     if environment.outcome_noise and rng.bit_generator.state == untouched and not np.array_equal(kept, again):
-        yield f"{seen}: nothing was drawn from rng; does its noise come from a generator of its own?"
-        return
+        raise _BrokenError(f"{seen}: nothing was drawn from rng; does its noise come from a generator of its own?")
     yield from _differ(environment, kept, again, seen)
     if np.abs(kept - again).max() > _rounding(environment):
         return
@@ -217,18 +212,15 @@ def _batches(environment: Environment, tried: Movements) -> Iterator[str]:
         return [stream(row, "row") for row in range(len(tried))]
 
     together = _call(environment, "execute_many", contexts.copy(), thetas.copy(), rngs())
-    if (wrong := _misshapen("execute_many()", together, len(tried), environment.outcomes.dim)) is not None:
-        yield wrong
-        return
+    _check_shape("execute_many()", together, len(tried), environment.outcomes.dim)
     kept = together.copy()
     for row, (movement, rng) in enumerate(zip(tried, rngs(), strict=True)):
         single = _call(environment, "execute", *movement, rng)
         if not np.array_equal(single, kept[row]):
-            yield (
+            raise _BrokenError(
                 f"row {row} of execute_many() is {_text(kept[row])}, execute() gives {_text(single)}; they must be "
                 "equal to the last bit: does each row use its own rng, in the same order of draws and of sums?"
             )
-            return
     last = _call(environment, "execute_many", contexts[-1:].copy(), thetas[-1:].copy(), rngs()[-1:])
     if not np.array_equal(together, kept):
         yield _used_twice("execute_many()")
@@ -269,18 +261,17 @@ def _call(environment: Environment, name: str, *arguments: Any) -> Any:
         return getattr(environment, name)(*arguments)
     except (Exception, SystemExit) as error:  # code of the user may raise anything
         given = f" for theta {_text(arguments[1])}" if name == "execute" else ""
-        raise _RaisedError(f"{name}() raised {type(error).__name__}{given}: {error}") from error
+        raise _BrokenError(f"{name}() raised {type(error).__name__}{given}: {error}") from error
 
 
-def _misshapen(what: str, value: Any, *shape: int) -> str | None:
+def _check_shape(what: str, value: Any, *shape: int) -> None:
     if not isinstance(value, np.ndarray) or isinstance(value, np.ma.MaskedArray):
         hint = "is its return missing?" if value is None else "np.array([x]) makes one"
         hint = "raise SimulationError where there is no outcome" if isinstance(value, np.ma.MaskedArray) else hint
-        return f"{what} must give an array of shape {shape}, got {type(value).__name__}; {hint}"
+        raise _BrokenError(f"{what} must give an array of shape {shape}, got {type(value).__name__}; {hint}")
     if value.shape != shape or value.dtype != np.float64:
         hint = "is it called with one movement?" if value.ndim != len(shape) else "was an axis or a dtype forgotten?"
-        return f"{what} must give float64 of shape {shape}, got {value.dtype} {value.shape}; {hint}"
-    return None
+        raise _BrokenError(f"{what} must give float64 of shape {shape}, got {value.dtype} {value.shape}; {hint}")
 
 
 def _used_twice(what: str) -> str:

@@ -85,7 +85,7 @@ class FishingRod:
     def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
         """``(2,)`` m, landing point of the float; the number of draws does not depend on theta. See `Environment`."""
         context, theta = check_movement(self, context, theta)
-        (landing,) = self._execute(context[None], theta[None], [rng])
+        (landing,) = self.execute_many(context[None], theta[None], [rng])
         if np.isnan(landing).any():
             raise SimulationError(f"the simulation diverged in context {context.tolist()}", theta)
         return landing
@@ -97,15 +97,16 @@ class FishingRod:
         outcomes = np.empty((len(thetas), self.outcomes.dim))
         for start in range(0, len(order), _BLOCK):
             block = order[start : start + _BLOCK]
-            outcomes[block] = self._execute(contexts[block], thetas[block], [rngs[row] for row in block])
+            commands = [self._commands(thetas[row], rngs[row]) for row in block]
+            ends = np.array([self.primitive.duration(thetas[row]) + HOLD for row in block])
+            outcomes[block] = self._caster.cast(commands, ends, contexts[block].sum(axis=1))  # an empty sum is 0
         return outcomes
 
     def trace(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> RodTrace:
-        """Run one movement and keep the state at every step, for films; this takes twice as long as ``execute``."""
+        """Run one movement and keep the state at every step, for films."""
         context, theta = check_movement(self, context, theta)
-        commands, end = self._commands(theta, rng), self.primitive.duration(theta) + HOLD
-        (outcome,), _ = self._caster.cast([commands], np.array([end]), np.array([context.sum()]))
-        return self._caster.trace(outcome, commands, end, float(context.sum()))
+        end = self.primitive.duration(theta) + HOLD
+        return self._caster.trace(self._commands(theta, rng), end, float(context.sum()))
 
     def replay(self, times: ArrayLike, trajectory: ArrayLike) -> Array:
         """``(2,)`` m, landing point if the arm follows a recording of at most 60 s, without wind; see `Replaying`."""
@@ -115,16 +116,10 @@ class FishingRod:
         end = float(times[-1]) + HOLD
         steps = self._times(end)
         commands = np.stack([np.interp(steps, times, column) for column in trajectory.T], axis=1)
-        landings, diverged = self._caster.cast([commands], np.array([end]), np.zeros(1))
-        if diverged.any():
+        (landing,) = self._caster.cast([commands], np.array([end]), np.zeros(1))
+        if np.isnan(landing).any():
             raise SimulationError("the simulation of a recorded trajectory diverged", trajectory[-1])
-        return landings[0]
-
-    def _execute(self, contexts: Array, thetas: Array, rngs: Sequence[np.random.Generator]) -> Array:
-        commands = [self._commands(theta, rng) for theta, rng in zip(thetas, rngs, strict=True)]
-        ends = np.array([self.primitive.duration(theta) + HOLD for theta in thetas])
-        landings, _ = self._caster.cast(commands, ends, contexts.sum(axis=1))  # an empty context sums to 0
-        return landings
+        return landing
 
     def _times(self, end: float) -> Array:
         """Times (s) of the commands up to ``end``, and of one more, as sensors show the state *before* each step."""

@@ -98,7 +98,7 @@ class FromGymnasium:
 
     @property
     def noticed(self) -> str:
-        """Sentence about episodes that end early, "" if most do not; see `Noticing`."""
+        """Sentence about episodes that end early, "" if most do not; see `remarks_on`."""
         early = [n for n in self._ended if n]
         if 2 * len(early) < max(len(self._ended), FEWEST):
             return ""

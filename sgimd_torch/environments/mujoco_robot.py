@@ -19,7 +19,7 @@ from mujoco import rollout
 from numpy.typing import ArrayLike
 
 from sgimd_torch.environments.controllers import Controller
-from sgimd_torch.environments.models.file import file_of, files_of, load_model
+from sgimd_torch.environments.models.file import file_of, load_model
 from sgimd_torch.environments.models.look import NEARLY, SUNK, listed, missed, parts, reached
 from sgimd_torch.environments.models.places import (
     body_of,
@@ -146,7 +146,7 @@ class MujocoRobot:
         threads = check_count("threads", threads, 1, 1024)
         path = file_of(model)
         loaded = load_model(path, joints, servos, keyframe, posture)
-        self.model, self.remarks, self.files = loaded.model, loaded.remarks, files_of(path)
+        self.model, self.remarks, self.files = loaded.model, loaded.remarks, loaded.files
         self._longest, self._settle, self._displacement, self.noise = durations[1], settle, displacement, noise
         self._n_steps(self._longest)
         self._home, self._held = self._begin(loaded.start)
@@ -176,7 +176,10 @@ class MujocoRobot:
         self._data = [mujoco.MjData(self.model) for _ in range(threads)]
         names = [name for place in self._places for name in place.names]
         self._dim = len(names)
-        still = check_point("rest", rest, self._dim) if rest else self._still_outcome(path.name)
+        if rest:
+            still = check_point("rest", rest, self._dim)
+        elif np.isnan(still := self._outcome(self._held_still())).any():
+            raise ValueError(f"{path.name} diverges even while it holds still; is its timestep too long?")
         if low or high:
             corners = [check_point(name, corner, self._dim) for name, corner in (("low", low), ("high", high))]
         else:
@@ -349,13 +352,11 @@ class MujocoRobot:
     def _simulate(self, contexts: Array, commands: Sequence[Array]) -> list[Array | None]:
         """States of each movement, the first one before its first step; None if the simulation diverged."""
         starts = np.stack([self.start_in(context) for context in contexts])
-        n_steps = [len(sequence) for sequence in commands]
-        controls = np.stack(
-            [np.pad(sequence, ((0, max(n_steps) - len(sequence)), (0, 0)), "edge") for sequence in commands]
-        )
+        longest = max(map(len, commands))
+        controls = np.stack([np.pad(one, ((0, longest - len(one)), (0, 0)), "edge") for one in commands])
         run, _ = self._pool.rollout(self.model, self._data, starts, controls)
         simulated = list[Array | None]()
-        for start, states, n in zip(starts, run, n_steps, strict=True):
+        for start, states, n in zip(starts, run, map(len, commands), strict=True):
             # A diverging simulation stops, or begins again at the time 0; the first entry of a state is its time.
             right = abs(states[n - 1, 0] - n * self.model.opt.timestep) < self.model.opt.timestep / 2
             simulated.append(np.concatenate([start[None], states[:n]]) if right else None)
@@ -383,13 +384,6 @@ class MujocoRobot:
         middle = (self.contexts.low + self.contexts.high) / 2
         return self._simulate(middle[None], [self._still(self._longest)])[0]
 
-    def _still_outcome(self, file: str) -> Array:
-        """``(outcome_dim,)``, the outcome of a movement that holds the start, in the middle of C."""
-        still = self._held_still()
-        if still is None:
-            raise ValueError(f"{file} diverges even while it holds still; is its timestep too long?")
-        return self._outcome(still)
-
     def _look(self) -> list[str]:
         """Sentences on what a user should know before the first movement."""
         lines, still = parts(self.model, self.bodies), self._held_still()
@@ -408,23 +402,20 @@ class MujocoRobot:
         signs = [stream(0, "signs", k).choice([-1, 1], self.policies.dim) for k in range(LOOKED)]
         sets = thetas, self.policies.clip(thetas + NEARLY * np.stack(signs))
         commands = [[self._commands(t, stream(0, "looked at", k)) for k, t in enumerate(s)] for s in sets]
-        ones, others = (self._simulate(contexts, sequences) for sequences in commands)
-        right = [
-            k for k, pair in enumerate(zip(ones, others, strict=True)) if pair[0] is not None and pair[1] is not None
-        ]
+        pairs = zip(commands[0], *(self._simulate(contexts, sequences) for sequences in commands), strict=True)
+        right = [(sent[-1], one, other) for sent, one, other in pairs if one is not None and other is not None]
         if not right:
             return [*lines, "every random movement diverges: write a shorter timestep into the model"]
         if self.joints:
-            ends = np.stack([self.positions(states[-1]) for k in right if (states := ones[k]) is not None])
-            last = np.stack([commands[0][k][-1, self._actuators] for k in right])
+            ends = np.stack([self.positions(one[-1]) for _, one, _ in right])
+            last = np.stack([sent[self._actuators] for sent, _, _ in right])
             lines += missed(self.model, [self.model.joint(name).id for name in self.joints], ends, last)
         if isinstance(self._controller, GaussianPrimitive):
             lasts = [self._controller.duration(theta) for theta in thetas]
             if max(lasts) > self._longest:
                 lines.append(f"movements last {min(lasts):.2g} to {max(lasts):.2g} s, as no joint can move faster")
-        return lines + reached(
-            np.array([[self._outcome(ones[k]), self._outcome(others[k])] for k in right]), self.outcomes
-        )
+        outcomes = np.array([[self._outcome(one), self._outcome(other)] for _, one, other in right])
+        return lines + reached(outcomes, self.outcomes)
 
     def _drawn(self, name: str, n: int) -> tuple[Array, Array]:
         """Contexts and thetas of ``n`` random movements."""

@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from typing import Final, Protocol, runtime_checkable
+from typing import Final
 
 import numpy as np
 
@@ -21,25 +21,16 @@ CLIPPED: Final = 0.1  # share of outcomes on the border of T that is told
 NARROW: Final = 0.03  # share of the volume of T that outcomes span; less is told
 
 
-@runtime_checkable
-class Noticing(Protocol):
-    """An environment that notices what a user should know of its movements, such as episodes that end early."""
-
-    @property
-    def noticed(self) -> str:
-        """Sentence about the movements so far, "" for none."""
-        ...
-
-
 def remarks_on(robot: Environment, outcomes: Array) -> dict[str, str]:
     """Sentences for the user, by kind.
 
     Args:
-        robot: robot that has moved.
+        robot: robot that has moved. Its ``noticed``, if it has one, is a sentence on what it noticed of its movements,
+            such as episodes that end early, "" for nothing.
         outcomes: ``(n, outcome_dim)``, outcomes of its movements, in order; the latest 500 count.
     """
     space, outcomes = robot.outcomes, outcomes[-LATEST:]
-    told = {"noticed": robot.noticed} if isinstance(robot, Noticing) and robot.noticed else {}
+    told = {"noticed": said} if (said := getattr(robot, "noticed", "")) else {}
     if (n := len(outcomes)) < FEWEST:
         return told
     differ = (outcomes != outcomes[-1]).any(axis=1)[::-1]

@@ -2,7 +2,7 @@
 
 Section 4 of Nguyen & Oudeyer (2014); ``fishing_rod.py`` computes the commands. All commands are known before a movement
 begins, so MuJoCo simulates many movements in parallel, outside Python.
-    landings, diverged = Caster(path, posture).cast([commands], ends)
+    landings = Caster(path, posture).cast([commands], ends, winds)
 
 The landing point is where the float first meets the water (z = 0), interpolated between two steps. If the float has not
 met the water when the commands end, the line is let out: the float then flies freely, pushed by the wind, and lands
@@ -84,11 +84,10 @@ class Caster:
         self._float_mass = float(model.body("float").mass[0])
         self._threads = os.cpu_count() or 1 if threads is None else threads
         self._pools: dict[int, tuple[rollout.Rollout, list[mujoco.MjData]]] = {}
-        self._rooms: dict[str, Array] = {}
         self.home, self.hanging = self._settle(posture)
         """Start configuration (a full physics state), and position (m) and velocity (m/s) ``(6,)`` of its float."""
 
-    def cast(self, commands: list[Array], ends: Array, winds: Array) -> tuple[Array, np.ndarray]:
+    def cast(self, commands: list[Array], ends: Array, winds: Array) -> Array:
         """Simulate movements in parallel; the outcome of each is the same, bit for bit, as if simulated alone.
 
         Args:
@@ -97,46 +96,47 @@ class Caster:
             winds: ``(n,)`` N, forces of the wind on the float along x.
 
         Returns:
-            ``(n, 2)`` m, landing points of the floats, and ``(n,)``, whether the simulation diverged.
+            ``(n, 2)`` m, landing points of the floats; NaN if the simulation diverged.
         """
-        states, controls = self._begin(commands, winds)
-        run, seen = self._rollout(states, controls)
-        landings, diverged = np.full((len(commands), 2), np.nan), np.zeros(len(commands), dtype=bool)
-        speeds = slice(1 + self.model.nq, 1 + self.model.nq + self.model.nv)
-        for row, end in enumerate(ends):
-            n_steps = len(commands[row])
-            speed, track = run[row, :n_steps, speeds], seen[row, :n_steps]
-            wet = int((track[:, 2] <= 0).argmax())  # first step with the float in the water; 0 if there is none
-            if not (speed.max() < TOP_SPEED and speed.min() > -TOP_SPEED):  # also true for NaN
-                diverged[row] = True
-            elif wet:
-                landings[row] = _crossing(track[wet - 1], track[wet])
-            else:
-                after = n_steps - 1 - end / self.timestep  # number of steps from end to the last state
-                landings[row] = self._let_out(track[-1] + after * (track[-2] - track[-1]), float(winds[row]))
-        return landings, diverged
+        run, seen = self._rollout(*self._begin(commands, winds))
+        movements = zip(run, seen, map(len, commands), ends.tolist(), winds.tolist(), strict=True)
+        return np.stack([self._land(states[:n], track[:n], end, wind)[0] for states, track, n, end, wind in movements])
 
-    def trace(self, outcome: Array, commands: Array, end: float, wind: float) -> RodTrace:
-        """Trace of one movement, whose landing point ``outcome`` was computed by ``cast``."""
+    def trace(self, commands: Array, end: float, wind: float) -> RodTrace:
+        """Trace of one movement."""
         states, controls = self._begin([commands], np.array([wind]))
         run, seen = self._rollout(states, controls)
-        states, floats, push = np.concatenate([states, run[0]]), seen[0].copy(), wind / self._float_mass
-        let_out = None
-        wet = np.flatnonzero(floats[:, 2] <= 0)
-        if wet.size:
-            above, below = floats[wet[0] - 1 : wet[0] + 1, 2]
-            landed = self.timestep * float(wet[0] - 1 + above / (above - below))
-        else:
-            share = len(commands) - 1 - end / self.timestep
-            let_out = end
-            landed = end + self._flight(floats[-1] + share * (floats[-2] - floats[-1]))
+        outcome, landed, let_out = self._land(run[0], seen[0], end, wind)
+        states, floats = np.concatenate([states, run[0]]), seen[0]
         n_steps = math.ceil(landed / self.timestep) + 1
         if n_steps > len(floats):
             held = np.repeat(controls[:, -1:], n_steps - len(floats), axis=1)
             run, seen = self._rollout(states[-1:], held)
             states, floats = np.concatenate([states, run[0]]), np.concatenate([floats, seen[0]])
-        kept = states[:n_steps], floats[:n_steps]
+        kept, push = (states[:n_steps], floats[:n_steps]), wind / self._float_mass
         return RodTrace(outcome, landed, let_out, self.timestep, *kept, push, self._gravity)
+
+    def _land(self, states: Array, track: Array, end: float, wind: float) -> tuple[Array, float, float | None]:
+        """Landing point ``(2,)`` m and time (s) of a movement, NaN if it diverged; time (s) when the line was let out.
+
+        Args:
+            states: ``(n_steps, n_state)``, states after each step.
+            track: ``(n_steps, 6)``, position (m) and velocity (m/s) of the float before each step.
+            end: time (s) when the line is let out, if the float has not met the water before.
+            wind: force (N) of the wind on the float along x.
+        """
+        speed = states[:, 1 + self.model.nq : 1 + self.model.nq + self.model.nv]
+        if not (speed.max() < TOP_SPEED and speed.min() > -TOP_SPEED):  # also true for NaN
+            return np.full(2, np.nan), np.nan, None
+        if wet := int((track[:, 2] <= 0).argmax()):  # first step with the float in the water; 0 if there is none
+            above, below = track[wet - 1], track[wet]
+            share = above[2] / (above[2] - below[2])
+            return above[:2] + share * (below[:2] - above[:2]), float(self.timestep * (wet - 1 + share)), None
+        after = len(track) - 1 - end / self.timestep  # number of steps from end to the last state
+        x, y, z, dx, dy, dz = (track[-1] + after * (track[-2] - track[-1])).tolist()
+        flight = (dz + math.sqrt(dz * dz + 2 * self._gravity * max(z, 0.0))) / self._gravity
+        landing = np.array([x + (dx + wind / self._float_mass * flight / 2) * flight, y + dy * flight])
+        return landing, end + flight, end
 
     def _settle(self, posture: Array) -> tuple[Array, Array]:
         """Start configuration c_org, with the arm in ``posture`` and the line hanging still, and state of its float."""
@@ -162,46 +162,20 @@ class Caster:
         controls[:, :, 6] = winds[:, None]
         return np.repeat(self.home[None], n, axis=0), controls
 
-    def _let_out(self, seen: Array, wind: float) -> tuple[float, float]:
-        """Landing point (m) after a free flight that begins at the position and velocity ``seen`` ``(6,)``."""
-        x, y, _, dx, dy, _ = seen.tolist()
-        flight = self._flight(seen)
-        return x + (dx + wind / self._float_mass * flight / 2) * flight, y + dy * flight
-
-    def _flight(self, seen: Array) -> float:
-        """Duration (s) of a free flight that begins at the position and velocity ``seen`` ``(6,)``."""
-        z, dz = float(seen[2]), float(seen[5])
-        return (dz + math.sqrt(dz * dz + 2 * self._gravity * max(z, 0.0))) / self._gravity
-
     def _rollout(self, states: Array, controls: Array) -> tuple[Array, Array]:
-        """States after each step; position and velocity of the float *before* each step, when MuJoCo reads its sensors.
-
-        The next call overwrites both arrays: allocating new arrays would take longer than all else in this class.
-        """
+        """States after each step; position and velocity of the float *before* each step, when sensors are read."""
         threads = self._threads if len(states) > 1 else 1
         if threads not in self._pools:
             data = [mujoco.MjData(self.model) for _ in range(threads)]
             self._pools[threads] = (rollout.Rollout(nthread=threads if threads > 1 else 0), data)
         pool, data = self._pools[threads]
         n, n_steps = controls.shape[:2]
-        run = self._room("run", n, n_steps, states.shape[1])
-        seen = self._room("seen", n, n_steps, self.model.nsensordata)
+        run, seen = np.empty((n, n_steps, states.shape[1])), np.empty((n, n_steps, self.model.nsensordata))
         # MuJoCo's own checks and copies would take as long as four time steps; the shapes are right by construction.
         pool.rollout(
             [self.model] * n, data, states, controls, state=run, sensordata=seen, nstep=n_steps, skip_checks=True
         )
         return run, seen
-
-    def _room(self, name: str, *shape: int) -> Array:
-        size = math.prod(shape)
-        if name not in self._rooms or len(self._rooms[name]) < size:
-            self._rooms[name] = np.empty(size)
-        return self._rooms[name][:size].reshape(shape)
-
-
-def _crossing(above: Array, below: Array) -> Array:
-    share = above[2] / (above[2] - below[2])
-    return above[:2] + share * (below[:2] - above[:2])
 
 
 def _damped(model: mujoco.MjModel) -> mujoco.MjModel:

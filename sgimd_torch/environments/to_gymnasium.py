@@ -10,13 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from sgimd_torch.environments.from_gymnasium import gymnasium
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.spaces import Array, Box, check_point
-
-try:
-    import gymnasium
-except ImportError as error:
-    raise ImportError(f"this environment needs gymnasium: pip install 'sgimd-torch[gym]' ({error})") from error
 
 Observation = dict[str, Array]
 
@@ -34,16 +30,12 @@ class ToGymnasium(gymnasium.Env[Any, Any]):
 
     def __init__(self, environment: Environment) -> None:
         self.environment = environment
-        anywhere = gymnasium.spaces.Box(
-            -np.inf, np.inf, (environment.outcomes.dim,), np.float64
-        )  # outcomes may lie outside T
+        # Learners such as those of stable-baselines3 need an observation of at least one number.
+        contexts = environment.contexts if environment.contexts.dim else Box.cube(0.0, 1.0, 1)
+        anywhere = gymnasium.spaces.Box(-np.inf, np.inf, (environment.outcomes.dim,), np.float64)  # also outside T
+        goals = {"achieved_goal": anywhere, "desired_goal": _box(environment.outcomes)}
         self.observation_space: gymnasium.spaces.Dict[Any] = gymnasium.spaces.Dict(
-            {
-                # Learners such as those of stable-baselines3 need an observation of at least one number.
-                "observation": _box(environment.contexts if environment.contexts.dim else Box.cube(0.0, 1.0, 1)),
-                "achieved_goal": anywhere,
-                "desired_goal": _box(environment.outcomes),
-            }
+            {"observation": _box(contexts), **goals}
         )
         self.action_space: gymnasium.spaces.Box[Any] = _box(environment.policies)
         self._goal: Array | None = None

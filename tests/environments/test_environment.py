@@ -3,8 +3,9 @@
 import os
 import pickle
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.protocol import (
     BatchEnvironment,
+    Environment,
     SimulationError,
     check_movement,
     check_recording,
@@ -25,7 +27,7 @@ from sgimd_torch.environments.protocol import (
 )
 from sgimd_torch.environments.sketch import Sketch
 from sgimd_torch.evaluation import evaluate
-from sgimd_torch.spaces import Array, Box, stream
+from sgimd_torch.spaces import Array, Box, Failure, stream
 from worlds import problem, remember
 
 NO_CONTEXT = np.empty(0)
@@ -49,12 +51,27 @@ class Slope:
         return 2 * theta
 
 
-class FastSlope(Slope):
-    n_batches = 0
+def slope(base: type = Slope, **methods: object) -> Any:
+    """A slope, or another ``base``, of which the user writes some methods anew."""
+    return type("Other", (base,), methods)()
 
-    def execute_many(self, contexts: Array, thetas: Array, rngs: Sequence[np.random.Generator]) -> Array:
-        self.n_batches += 1
-        return 2 * thetas
+
+def together(steepness: float, seen: Callable[[Array], ArrayLike] = np.array) -> Callable[..., ArrayLike]:
+    return lambda self, contexts, thetas, rngs: seen(steepness * thetas)
+
+
+def steeper(self: object, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
+    """As a user who knows `Environment` alone begins: another robot, from one that moves in batches."""
+    return 3 * np.asarray(theta)
+
+
+FAST = slope(execute_many=together(2))
+THETAS, RNGS = np.array([[0.25], [0.75]]), [stream(seed, "row") for seed in range(2)]
+
+
+def executed(environment: Environment) -> list[Array | Failure]:
+    """The outcomes of two movements."""
+    return execute_many(environment, np.empty((2, 0)), THETAS, RNGS)
 
 
 environments = pytest.mark.parametrize(
@@ -65,7 +82,7 @@ environments = pytest.mark.parametrize(
         PlanarArm(noise=0.02, context=True),
         PlanarArm(context=True, outcomes=Box.cube(-100, 100, 2)),
         Slope(),
-        FastSlope(),
+        FAST,
         FishingRod(),
         FishingRod(max_wind=0.02),
     ],
@@ -79,93 +96,65 @@ def test_environment_keeps_the_contract(environment):
 
 
 def test_a_batch_is_executed_at_once_where_the_environment_can():
-    environment = FastSlope()
+    batches: list[int] = []
+
+    def counted(outcomes: Array) -> Array:
+        batches.append(len(outcomes))
+        return outcomes
+
+    environment = slope(execute_many=together(2, counted))
     assert isinstance(environment, BatchEnvironment)
     assert not isinstance(Slope(), BatchEnvironment)
-    rngs = [stream(seed, "row") for seed in range(2)]
-    assert execute_many(environment, np.empty((2, 0)), np.array([[0.25], [0.5]]), rngs) == [[0.5], [1.0]]
+    assert executed(environment) == [[0.5], [1.5]]
     assert execute_many(environment, np.empty((0, 0)), np.empty((0, 1)), []) == []
-    assert environment.n_batches == 1
-
-
-class Steeper(FastSlope):
-    """As a user who knows `Environment` alone begins: another robot, from one that moves in batches."""
-
-    def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
-        return 3 * np.asarray(theta)
-
-
-class SteeperTogether(Steeper):
-    def execute_many(self, contexts: Array, thetas: Array, rngs: Sequence[np.random.Generator]) -> Array:
-        return 3 * thetas
+    assert batches == [2]
 
 
 class Delegating:
     """A wrapper that passes on all but ``execute``."""
 
-    def __init__(self) -> None:
-        self.inner = FastSlope()
+    execute = steeper
 
     def __getattr__(self, name: str) -> object:
-        return getattr(self.inner, name)
-
-    def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
-        return 3 * np.asarray(theta)
+        return getattr(FAST, name)
 
 
-def patched() -> FastSlope:
-    slope = FastSlope()
-    vars(slope)["execute"] = Steeper().execute
-    return slope
+def patched() -> Slope:
+    fast = slope(type(FAST))
+    fast.execute = partial(steeper, fast)
+    return fast
 
 
-@pytest.mark.parametrize("environment", [Steeper(), SteeperTogether(), Delegating(), patched()])
+SUBCLASS, WHOLE = slope(type(FAST), execute=steeper), slope(type(FAST), execute=steeper, execute_many=together(3))
+
+
+@pytest.mark.parametrize("environment", [SUBCLASS, WHOLE, Delegating(), patched()])
 def test_what_a_parent_does_with_a_batch_does_not_count_for_an_execute_of_ones_own(environment):
-    rngs = [stream(seed, "row") for seed in range(2)]
-    assert execute_many(environment, np.empty((2, 0)), np.array([[0.25], [0.5]]), rngs) == [[0.75], [1.5]]
-    inverse = problem(environment, memory=remember(np.array([[0.25], [0.5]]), np.array([[0.75], [1.5]]))).inverse
-    assert evaluate(inverse, environment, np.array([[0.75], [1.5]]), 0, 0).errors.tolist() == [0, 0]
-    assert moves_in_batches(environment) == isinstance(environment, SteeperTogether)
-
-
-class Hiding(FastSlope):
-    """Its sensor is silent above .7, which a masked array says."""
-
-    def execute_many(self, contexts: Array, thetas: Array, rngs: Sequence[np.random.Generator]) -> Array:
-        return np.ma.masked_array(2 * thetas, thetas > 0.7)
+    outcomes = 3 * THETAS
+    assert executed(environment) == outcomes.tolist()
+    inverse = problem(environment, memory=remember(THETAS, outcomes)).inverse
+    assert evaluate(inverse, environment, outcomes, 0, 0).errors.tolist() == [0, 0]
+    assert moves_in_batches(environment) == (environment is WHOLE)
 
 
 def test_what_a_mask_hides_is_no_outcome():
-    rngs = [stream(seed, "row") for seed in range(2)]
-    outcomes = execute_many(Hiding(), np.empty((2, 0)), np.array([[0.25], [0.75]]), rngs)
-    assert all("got a masked array" in outcome.reason for outcome in outcomes)
+    hiding = slope(execute_many=together(2, lambda outcomes: np.ma.masked_array(outcomes, outcomes > 1.4)))
+    assert all("got a masked array" in outcome.reason for outcome in executed(hiding))
     with pytest.raises(ValueError, match="got MaskedArray; raise SimulationError where there is no outcome"):
-        check_environment(Hiding())
-
-
-class BrokenSlope(Slope):
-    def execute(self, context: Array, theta: Array, rng: np.random.Generator) -> Array:
-        return np.where(theta > 0.7, np.nan, theta)
+        check_environment(hiding)
 
 
 def test_an_outcome_in_a_batch_that_is_not_finite_is_a_failure_of_its_movement_alone():
-    thetas, rngs = np.array([[0.25], [0.75]]), [stream(seed, "row") for seed in range(2)]
-    first, second = execute_many(BrokenSlope(), np.empty((2, 0)), thetas, rngs)
+    first, second = executed(slope(execute=lambda self, context, theta, rng: np.where(theta > 0.7, np.nan, theta)))
     assert first == [0.25]
     assert "outcome must be finite" in second.reason
 
 
-class CarelessSlope(Slope):
-    def execute(self, context: Array, theta: Array, rng: np.random.Generator) -> Array:
-        theta *= 2
-        return theta
-
-
 def test_an_environment_that_writes_into_a_batch_leaves_the_callers_arrays_as_they_were():
-    thetas = np.array([[0.25], [0.5]])
-    outcomes = execute_many(CarelessSlope(), np.empty((2, 0)), thetas, [stream(seed, "row") for seed in range(2)])
-    assert outcomes == [[0.5], [1.0]]
-    assert thetas.tolist() == [[0.25], [0.5]]
+    careless = slope(execute=lambda self, context, theta, rng: np.multiply(theta, 2, out=theta))
+    before = THETAS.copy()
+    assert executed(careless) == [[0.5], [1.5]]
+    assert np.array_equal(THETAS, before)
 
 
 def test_a_diverged_simulation_names_its_theta_even_from_another_process():

@@ -93,9 +93,8 @@ def test_a_recording_beyond_the_joint_ranges_is_fitted_inside_them() -> None:
 def test_however_little_a_knot_would_lie_outside_the_others_make_up_for_its_bound(beyond: float) -> None:
     skill = unit_joint(9.0)
     times = np.linspace(0, 1.2, 40)
-    inside = skill.at(np.array([1.0, 0.5, 0.2, 0.8, 0.5]), times)
-    change = skill.at(np.array([1.0, 0.5, 0.2, 0.8, 0.5]), times) - skill.at(np.array([0.0, 0.5, 0.2, 0.8, 0.5]), times)
-    shown = inside + beyond * change  # the first knot would be 1 + beyond
+    one, zero = (skill.at(np.array([knot, 0.5, 0.2, 0.8, 0.5]), times) for knot in (1.0, 0.0))
+    shown = one + beyond * (one - zero)  # the first knot would be 1 + beyond
     found = skill.correspondence(times, shown)
     assert found[0] == pytest.approx(1.0, abs=1e-6)
 

@@ -22,6 +22,7 @@ from sgimd_torch.teach.leading import Leading
 from sgimd_torch.teach.led import hand_led_of
 from sgimd_torch.teach.lessons import lesson_by_hand
 from sgimd_torch.views.check import main as check
+from urdf import URDF
 
 # An arm of two links of .3 m in the plane z = .05, a puck of radius .04 beside it, and a door.
 ARM = """<mujoco>
@@ -45,25 +46,6 @@ ARM = """<mujoco>
   <keyframe><key name="bent" qpos="1 .5 .4 .3 .03 1 0 0 0 0"/></keyframe>
 </mujoco>"""
 TOOTH = "v 0 0 0\nv .01 0 0\nv 0 .01 0\nv 0 0 .01\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
-LINK = (
-    '<link name="{}"><inertial><origin xyz=".1 0 0"/><mass value="1"/>'
-    '<inertia ixx=".01" iyy=".01" izz=".01" ixy="0" ixz="0" iyz="0"/></inertial></link>'
-)
-JOINT = (
-    '<joint name="{}" type="{}"><parent link="{}"/><child link="{}"/><origin xyz="{} 0 0"/><axis xyz="0 1 0"/>'
-    '<limit lower="-1" upper="1" effort="30" velocity="5"/></joint>'
-)
-URDF = (
-    '<robot name="arm"><link name="base"/>'
-    + LINK.format("upper")
-    + JOINT.format("shoulder", "revolute", "base", "upper", 0)
-    + LINK.format("fore")
-    + JOINT.format("elbow", "revolute", "upper", "fore", 0.3)
-    + '<link name="tool"/>'
-    + JOINT.format("flange", "fixed", "fore", "tool", 0.2)
-    + "</robot>"
-)
-STEPS = [("still", 0), ("fine", 1e-9)]
 LIMITS = np.deg2rad([120, 90])
 CORNERS = {"low": (-1.0, -1.0), "high": (1.0, 1.0)}
 NONE = np.zeros(0)
@@ -72,10 +54,8 @@ NONE = np.zeros(0)
 @pytest.fixture(scope="module")
 def files(tmp_path_factory):
     folder = tmp_path_factory.mktemp("models")
-    absurd = {
-        f"{name}.xml": ARM.replace("<worldbody>", f'<option timestep="{step}"/><worldbody>') for name, step in STEPS
-    }
-    absurd["slow.urdf"] = re.sub('velocity="[^"]*"', 'velocity="1e-6"', URDF)
+    absurd = {"still.xml": ARM.replace("<worldbody>", '<option timestep="0"/><worldbody>')}
+    absurd["slow.urdf"] = URDF.replace('velocity="5"', 'velocity="1e-6"')
     for name, text in {"arm.xml": ARM, "arm.urdf": URDF, "tooth.obj": TOOTH, **absurd}.items():
         (folder / name).write_text(text)
     return folder
@@ -95,7 +75,7 @@ def steady(*angles, pace=0.5, limits=LIMITS):
 @pytest.mark.parametrize(
     "options",
     [
-        {"outcome": "site:tip:xy", "noise": 0.01},
+        {"outcome": "site:tip:xy", "noise": 0.01, "durations": (0.3, 0.5)},
         {"outcome": "body:puck:xy", "context": "body:puck:x:.35:.45,body:puck:y:.2:.35", "threads": 2},
         {"outcome": "body:puck:yx,site:tip:x", "displacement": True, "keyframe": "bent"},
         {"outcome": "joint:elbow", "joints": ("elbow",), "n_knots": 6, "context": "joint:hinge:-.1:.1"},
@@ -155,7 +135,7 @@ def test_a_joint_that_was_not_chosen_holds_its_start_in_the_keyframe(here):
 
 
 def test_most_movements_end_in_the_task_space_that_was_found_and_a_remark_tells_it(here):
-    robot = MujocoRobot("arm.xml", outcome="site:tip:xy")
+    robot = MujocoRobot("arm.xml", outcome="site:tip:xy", durations=(0.3, 0.5))
     rngs = [stream(7, "x", k) for k in range(60)]
     ended = robot.execute_many(np.zeros((60, 0)), np.stack([robot.policies.sample(rng) for rng in rngs]), rngs)
     assert robot.outcomes.contains(ended).mean() > 0.85
@@ -223,7 +203,7 @@ def test_outcomes_are_located_in_the_world_from_where_the_movement_begins(here):
 
 
 def test_what_was_found_is_given_to_the_next_robot_which_makes_no_movement(here, monkeypatch):
-    options = {"model": "arm.xml", "outcome": "site:tip:xy", "noise": 0.01}
+    options = {"model": "arm.xml", "outcome": "site:tip:xy", "noise": 0.01, "durations": (0.2, 0.4), "settle": 0.1}
     first = MujocoRobot(**options)
     assert first.found_options.keys() == {*MujocoRobot.FOUND_OPTIONS}
     monkeypatch.setattr(MujocoRobot, "_simulate", lambda *_: pytest.fail("it moved"))
@@ -233,21 +213,29 @@ def test_what_was_found_is_given_to_the_next_robot_which_makes_no_movement(here,
     assert second.remarks == []
 
 
-def test_a_run_keeps_what_was_found_and_a_resume_finds_nothing_anew(here, capsys, monkeypatch):
-    monkeypatch.chdir(here)
+def test_a_run_needs_no_code_keeps_what_was_found_and_tells_which_file_of_the_model_has_changed(
+    here, capsys, monkeypatch
+):
     robot = "--environment mujoco --environment.model arm.xml --environment.outcome site:tip:xy --name kept"
-    words = f"{robot} --algorithm random --repeats 0 --evaluate-at []".split()
+    words = f"{robot} --algorithm random --repeats 0 --evaluate-at 20".split()
     assert command(main, [*words, "--movements", "20"]) == 0
     assert "T was found by 300 random movements" in capsys.readouterr().err
-    run = read_run(here / "runs/kept/seed-000")
+    folder = here / "runs/kept/seed-000"
+    run = read_run(folder)
+    assert {"file arm.xml", "file tooth.obj"} <= about_of(folder)["versions"].keys()
+    assert config_of(run)["environment.outcome"] == "site:tip:xy"  # a text with a colon, but no code
     assert run.config["environment.low"] == run.spaces["outcomes"].low.tolist()
     monkeypatch.setattr(MujocoRobot, "_explored", lambda *_: pytest.fail("it explored"))
     assert finished(parse([*words, "--movements", "20"])[0])
     assert build(config_of(run)).environment.rest.tolist() == run.config["environment.rest"]
-    assert command(main, [*words, "--movements", "30", "--resume"]) == 0
-    other = [*words, "--movements", "30", "--resume", "--environment.low=-2,-2", "--environment.high=2,2"]
-    assert command(main, other) == 2
+    (here / "tooth.obj").write_text(f"{TOOTH}# sharper\n")
+    resume = [*words, "--movements", "30", "--resume"]
+    assert command(main, resume) == 0
+    assert "resumed with other versions: file tooth.obj crc32" in capsys.readouterr().err
+    assert command(main, [*resume, "--environment.low=-2,-2", "--environment.high=2,2"]) == 2
     assert "environment.low was [" in capsys.readouterr().err
+    assert command(check, ["mujoco", "--environment.model", "lost.xml"]) == 2
+    assert "lost.xml cannot be read or written" in capsys.readouterr().err
 
 
 def test_a_robot_made_by_a_function_of_the_user_has_no_options_to_keep(here):
@@ -278,21 +266,15 @@ def test_a_robot_made_by_a_function_of_the_user_has_no_options_to_keep(here):
         ({"model": ""}, "model is missing: the path of an MJCF or URDF file"),
         ({"model": "tooth.obj"}, "tooth.obj cannot be used: "),
         ({"settle": -1.0}, "settle must be finite and >= 0"),
-        ({"context": "joint:hinge:1_0:20"}, "1_0 and 20 must be two numbers, the lower one first"),
         ({"context": "joint:hinge:0:\u0661"}, "0 and \u0661 must be two numbers, the lower one first"),
         ({"joints": ("elbow", "elbow")}, "joints names 'elbow' 2 times"),
         ({"n_knots": 1}, "n_knots must be a whole number from 2 to 100, got 1"),
-        ({"n_knots": 10**9}, "n_knots must be a whole number from 2 to 100, got 1000000000"),
         ({"threads": 10**5}, "threads must be a whole number from 1 to 1024, got 100000"),
         ({"durations": (500.0, 1500.0)}, "1500 s and settle 0.5 s take 3e+05 steps at the model's timestep 0.005,"),
         ({"durations": (0.5, np.inf)}, "a movement of inf s and settle 0.5 s take inf steps"),
         ({"settle": 1e9}, "a movement of 1.5 s and settle 1e+09 s take 2e+11 steps"),
         ({"model": "still.xml"}, "take inf steps at the model's timestep 0, more than 100000"),
-        ({"model": "fine.xml"}, "take 2e+09 steps at the model's timestep 1e-09, more than 100000; durations, settle"),
-        (
-            {"model": "slow.urdf", "outcome": "body:tool:xz"},
-            "more than 100000; durations, settle and timestep are in s",
-        ),
+        ({"model": "slow.urdf", "outcome": "body:tool:xz"}, "more than 100000; durations, settle and timestep are in"),
         ({"low": (0.0, 0.0, 0.0), "high": (1.0, 1.0)}, "low must have shape (..., 2)"),
     ],
 )
@@ -336,21 +318,6 @@ def test_a_model_that_diverges_is_told(here):
     robot = MujocoRobot("stiff.xml", outcome="site:tip:xy", **CORNERS)
     with pytest.raises(SimulationError, match="the simulation diverged in context"):
         robot.execute(NONE, steady(1.0, 1.0), stream(0, "x"))
-
-
-def test_a_run_needs_no_code_and_tells_which_file_of_the_model_has_changed(here, capsys):
-    robot = "--environment mujoco --environment.model arm.xml --environment.outcome site:tip:xy --environment.low -1,-1"
-    words = f"{robot} --environment.high 1,1 --algorithm random --repeats 0 --evaluate-at 20".split()
-    assert command(main, [*words, "--movements", "20"]) == 0
-    run = here / "runs/random/seed-000"
-    assert {"file arm.xml", "file tooth.obj"} <= about_of(run)["versions"].keys()
-    assert config_of(read_run(run))["environment.outcome"] == "site:tip:xy"  # a text with a colon, but no code
-    (here / "tooth.obj").write_text(f"{TOOTH}# sharper\n")
-    capsys.readouterr()
-    assert command(main, [*words, "--movements", "30", "--resume"]) == 0
-    assert "resumed with other versions: file tooth.obj crc32" in capsys.readouterr().err
-    assert command(check, ["mujoco", "--environment.model", "lost.xml"]) == 2
-    assert "lost.xml cannot be read or written" in capsys.readouterr().err
 
 
 def test_an_arm_is_led_by_its_tip_to_where_its_movement_then_ends(here):

@@ -45,26 +45,19 @@ def test_a_dimension_that_never_changes_is_named():
     assert remarks_on(robot(), CASES["flat"])["flat"].startswith("y changes by no more than noise")
 
 
-ROBOT = """
-import numpy as np
-from sgimd_torch import Box
-from sgimd_torch.environments.protocol import check_movement
+DEAD = """
+from sliders import Slider
 
-class Dead:
-    contexts, policies, outcomes = Box.cube(0, 1, 0), Box.cube(0, 1, 2), Box.cube(0, 1, 1)
-    rest, outcome_noise, lived = np.zeros(1), 0.0, 0
-
-    def observe(self, rng):
-        return np.zeros(0)
+class Dead(Slider):
+    outcome_noise = 0.0
 
     def execute(self, context, theta, rng):
-        check_movement(self, context, theta)
-        return np.array([0.25])
+        return 0 * super().execute(context, theta, rng) + 0.25
 """
 
 
-def test_a_dead_sensor_is_told_by_the_check_once_by_a_run_and_by_all_that_shows_it(module, capsys):
-    module("dead", ROBOT)
+def test_a_dead_sensor_is_told_by_the_check_once_by_a_run_and_by_all_that_shows_it(own, module, capsys):
+    module("dead", DEAD)
     said = "outcomes are equal, [0.25]: is a sensor dead, or does no movement move what is measured?"
     assert command(_call, ["check", "dead:Dead"]) == 0
     assert f"  the last 20 {said}\n" in capsys.readouterr().out
@@ -77,4 +70,4 @@ def test_a_dead_sensor_is_told_by_the_check_once_by_a_run_and_by_all_that_shows_
         assert command(_call, view.split()) == 0
         assert f"runs/random/seed-000: the last 150 {said}\n" in capsys.readouterr().err
     assert command(_call, ["report", "runs", "--out", "page.html"]) == 0
-    assert f"the last 150 {said}" in (module("dead", ROBOT) / "page.html").read_text()
+    assert f"the last 150 {said}" in (own / "page.html").read_text()

@@ -16,8 +16,8 @@ import mujoco
 import numpy as np
 
 from sgimd_torch.environments.models.look import listed
-from sgimd_torch.environments.models.places import UNITS, joint_of, pulled
-from sgimd_torch.environments.models.posture import movable, nearest_posture, touching, within_ranges
+from sgimd_torch.environments.models.places import joint_of, movable, pulled
+from sgimd_torch.environments.models.posture import nearest_posture, touching, within_ranges
 from sgimd_torch.environments.models.servos import joints_to_serve, serve
 from sgimd_torch.files import check_regular
 from sgimd_torch.options.catalogue import unknown_name_error
@@ -37,6 +37,7 @@ class Loaded(NamedTuple):
     speeds: dict[str, float]  # rad/s or m/s
     accelerations: dict[str, float]  # rad/s^2 or m/s^2
     remarks: list[str]
+    files: list[Path]  # of the model, and all that it includes or refers to, such as meshes
 
 
 def file_of(model: str | Path) -> Path:
@@ -89,6 +90,8 @@ def _load(path: Path, joints: Sequence[str], servos: str, keyframe: str, posture
                 element.name = element.name or f"unnamed_{k}"
         spec.compiler.fusestatic = False  # else links on fixed joints of a URDF, such as its tool, lose their names
         model, root = spec.compile(), _root(path)
+        files = {path, *map(Path, mujoco.mju_getXMLDependencies(str(path)))}
+        files |= {path.parent / spec.meshdir / mesh.file for mesh in spec.meshes if mesh.file}
         alone, limits = root.tag == "robot", [(joint, joint.find("limit")) for joint in root.iter("joint")]
         # MuJoCo does not read the speeds of a URDF.
         speeds = {
@@ -103,8 +106,8 @@ def _load(path: Path, joints: Sequence[str], servos: str, keyframe: str, posture
             remarks.append(f"{path.name} has {cause}: position servos were made for {names}")
             if held > len(pulled(model)):
                 remarks.append("constraints to mocap bodies, which would hold the arm, were left out")
-        arm = [joint for k in range(model.nu) if (joint := joint_of(model, k)) is not None]
-        arm = sorted({joint for joint in arm if int(model.jnt_type[joint]) in UNITS})
+        acted = {joint_of(model, k) for k in range(model.nu)}
+        arm = [joint for joint in movable(model) if joint in acted]
         bodies = _robot(model, arm, alone=alone)
         model = _without(spec, model, _beside_base(model, bodies))
         keys = [model.key(k).name for k in range(model.nkey)]
@@ -125,7 +128,8 @@ def _load(path: Path, joints: Sequence[str], servos: str, keyframe: str, posture
             data.qpos[:] = start
         kept = tuple(float(x) for x in data.qpos[model.jnt_qposadr[movable(model)]])
         speeds |= {name: min(speed, speeds.get(name, np.inf)) for name, speed in slow.items()}
-        return Loaded(model, data, kept, speeds, accelerations, remarks)
+        parts = sorted({file.resolve() for file in files if file.is_file()})
+        return Loaded(model, data, kept, speeds, accelerations, remarks, parts)
     except (ValueError, ElementTree.ParseError) as error:
         raise ValueError(f"{path.name} cannot be used: {_with_advice(' '.join(str(error).split()), path)}") from error
 
@@ -151,13 +155,6 @@ def _check_parts(path: Path) -> None:
 def _root(path: Path) -> ElementTree.Element:
     """The first tag of a file; as for MuJoCo, blanks around it do no harm."""
     return ElementTree.fromstring(path.read_bytes().strip(b"\0 \t\r\n"))
-
-
-def files_of(path: Path) -> list[Path]:
-    """The file of a model, and all files that it includes or refers to, such as meshes."""
-    spec, files = mujoco.MjSpec.from_file(str(path)), {path, *map(Path, mujoco.mju_getXMLDependencies(str(path)))}
-    files |= {path.parent / spec.meshdir / _of_package(path, mesh.file) for mesh in spec.meshes if mesh.file}
-    return sorted({file.resolve() for file in files if file.is_file()})
 
 
 def _reset(model: mujoco.MjModel, keyframe: str) -> mujoco.MjData:

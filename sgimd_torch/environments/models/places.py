@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import mujoco
@@ -83,7 +83,7 @@ def outcome_places(model: mujoco.MjModel, outcome: str) -> list[Place]:
         if not set(axes) <= set(_AXES if kind != "joint" else "") or len(set(axes)) < len(axes):
             raise ValueError(f"outcome {text!r}: {axes!r} are no axes; write some of x, y and z, for a joint nothing")
         axes = axes or _AXES if kind != "joint" else ""
-        places.append(Place(kind, name, place.number, tuple(map(_AXES.index, axes)), place.unit, place.address))
+        places.append(replace(place, axes=tuple(map(_AXES.index, axes))))
     if len({place.unit for place in places}) > 1:
         raise ValueError(f"outcome {outcome!r} mixes lengths (m) and angles (rad); a goal needs one unit")
     return places
@@ -136,51 +136,44 @@ def commands_box(model: mujoco.MjModel, joints: Sequence[str], start: Array) -> 
     Raises:
         ValueError: a joint does not exist or has no actuator, or a command has no range.
     """
-    moved, sides, remarks = dict[str, list[int]](), list[Array](), list[str]()
-    for k in range(model.nu):
-        joint = joint_of(model, k)
-        moved.setdefault(model.actuator(k).name if joint is None else model.joint(joint).name, []).append(k)
+    moves = [joint_of(model, k) for k in range(model.nu)]
+    names = [model.actuator(k).name if j is None else model.joint(j).name for k, j in enumerate(moves)]
     for name, n in Counter(joints).items():
         if n > 1:
             raise ValueError(f"joints names {name!r} {n} times; one command moves a joint")
-        if name not in moved:
-            hint = did_you_mean(name, moved) or f"; known are {', '.join(moved)}"
+        if name not in names:
+            hint = did_you_mean(name, names) or f"; known are {', '.join(dict.fromkeys(names))}"
             raise ValueError(f"joints: {name!r} is no joint with an actuator{hint}")
-    chosen, endless = [k for name in joints or moved for k in moved[name]], list[str]()
+    chosen = [k for name in joints or dict.fromkeys(names) for k in range(model.nu) if names[k] == name]
+    sides, endless, remarks = list[Array](), list[str](), list[str]()
     if not joints:  # a slide without a range, such as that of a base, stays where it is
-        held = [k for k in chosen if not model.actuator_ctrllimited[k] and slides_on(model, joint_of(model, k))]
+        held = [k for k in chosen if not model.actuator_ctrllimited[k] and slides_on(model, moves[k])]
         chosen = [k for k in chosen if k not in held]
-        sliding = ", ".join(model.joint(joint_of(model, k)).name for k in held)
+        sliding = ", ".join(names[k] for k in held)
         advice = "write ranges into the model, or command forces: --environment.servos file"
         remarks += [f"slides without a range stay where they are: {sliding}; {advice}"] * bool(held)
     for k in chosen:
-        joint, side = joint_of(model, k), model.actuator_ctrlrange[k]
+        joint, side = moves[k], model.actuator_ctrlrange[k]
         if not model.actuator_ctrllimited[k]:
             if joint is None or not is_servo(model, k):
                 raise ValueError(f"actuator {model.actuator(k).name!r} has no ctrlrange; write one into the model")
             if slides_on(model, joint):
-                raise ValueError(f"joint {model.joint(joint).name!r} slides without a range; write one into the model")
+                raise ValueError(f"joint {names[k]!r} slides without a range; write one into the model")
             side = model.jnt_range[joint] if model.jnt_limited[joint] else np.array([-np.inf, np.inf])
             side = np.sort(side * model.actuator_gear[k, 0])
         turn = 2 * np.pi * abs(model.actuator_gear[k, 0])
-        if (
-            joint is not None
-            and UNITS.get(int(model.jnt_type[joint])) == "rad"
-            and is_servo(model, k)
-            and np.ptp(side) > turn
-        ):
+        turns = joint is not None and UNITS.get(int(model.jnt_type[joint])) == "rad" and is_servo(model, k)
+        if turns and np.ptp(side) > turn:
             low = np.clip(start[k] - turn / 2, side[0], side[1] - turn)
             side = np.array([low, low + turn])
-            endless.append(model.joint(joint).name)
+            endless.append(names[k])
         sides.append(side)
     if endless:
         remarks.append(f"more than a turn would be free, so half a turn each way from the start: {', '.join(endless)}")
     if not chosen:
         raise ValueError("; ".join(["no actuator moves a joint of the model with a range", *remarks]))
-    owners = [joint_of(model, k) for k in chosen]
-    names = [model.actuator(k).name if j is None else model.joint(j).name for j, k in zip(owners, chosen, strict=True)]
     low, high = np.array(sides).T
-    return Box(low, high, tuple(names)), chosen, remarks
+    return Box(low, high, tuple(names[k] for k in chosen)), chosen, remarks
 
 
 def slides_on(model: mujoco.MjModel, joint: int | None) -> bool:
@@ -211,11 +204,8 @@ def positions(model: mujoco.MjModel, actuators: Sequence[int]) -> tuple[str, ...
 
 def moved_by(model: mujoco.MjModel, actuators: Sequence[int]) -> list[int]:
     """Bodies that a joint of one of ``actuators`` moves, from the base outwards; all if they act on no joint."""
-    bodies = {int(model.jnt_bodyid[joint]) for k in actuators if (joint := joint_of(model, k)) is not None}
-    for body in range(1, model.nbody):  # a parent has a lower number
-        if int(model.body_parentid[body]) in bodies:
-            bodies.add(body)
-    return sorted(bodies) or [*range(1, model.nbody)]
+    joints, bodies = {joint_of(model, k) for k in actuators}, [*range(1, model.nbody)]
+    return [body for body in bodies if joints & {*joints_above(model, body)}] or bodies
 
 
 def pulled(model: mujoco.MjModel) -> list[tuple[int, int]]:
@@ -232,12 +222,13 @@ def pulled(model: mujoco.MjModel) -> list[tuple[int, int]]:
 
 def joints_above(model: mujoco.MjModel, body: int) -> list[int]:
     """Joints between the world and a body."""
-    joints = list[int]()
-    while body:
-        first = int(model.body_jntadr[body])
-        joints += range(first, first + int(model.body_jntnum[body]))
-        body = int(model.body_parentid[body])
-    return joints
+    bodies = path_to(model, body)
+    return [k for k in range(model.njnt) if model.jnt_bodyid[k] in bodies]
+
+
+def movable(model: mujoco.MjModel) -> list[int]:
+    """Joints that turn or slide."""
+    return [k for k in range(model.njnt) if int(model.jnt_type[k]) in UNITS]
 
 
 def check_moved(model: mujoco.MjModel, place: Place, actuators: Sequence[int]) -> None:

@@ -13,24 +13,18 @@ import mujoco
 import numpy as np
 from scipy.optimize import minimize
 
-from sgimd_torch.environments.models.places import UNITS
+from sgimd_torch.environments.models.places import movable
 from sgimd_torch.spaces import Array
 
 NEAR: Final = 0.004  # m, distance of two geoms that counts as a contact while a posture is looked for
 _WEIGHTS: Final = (1e3, 1e5, 1e7)  # 1/m^2, growing weight of contacts against the way (rad or m) to a posture
 
 
-def movable(model: mujoco.MjModel) -> list[int]:
-    """Joints that turn or slide."""
-    return [k for k in range(model.njnt) if int(model.jnt_type[k]) in UNITS]
-
-
 def within_ranges(model: mujoco.MjModel, qpos: Array) -> Array:
     """``(nq,)``, the nearest positions within the ranges of all joints."""
-    within = np.array(qpos)
-    for k in movable(model):
-        if model.jnt_limited[k]:
-            within[model.jnt_qposadr[k]] = np.clip(within[model.jnt_qposadr[k]], *model.jnt_range[k])
+    joints = [k for k in movable(model) if model.jnt_limited[k]]
+    within, places = np.array(qpos), model.jnt_qposadr[joints]
+    within[places] = np.clip(within[places], *model.jnt_range[joints].T)
     return within
 
 

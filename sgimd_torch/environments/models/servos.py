@@ -12,7 +12,7 @@ from typing import Final
 import mujoco
 import numpy as np
 
-from sgimd_torch.environments.models.places import UNITS, is_servo, joint_of, joints_above, pulled
+from sgimd_torch.environments.models.places import is_servo, joint_of, joints_above, movable, pulled
 from sgimd_torch.spaces import Array, stream
 
 FREQUENCY: Final = 30.0  # rad/s, natural frequency of a servo
@@ -29,23 +29,20 @@ def joints_to_serve(model: mujoco.MjModel, servos: str, joints: Sequence[str], *
     If nothing acts on a joint, the robot is the tree of bodies that has one of ``joints``, else the largest tree. A
     model that is ``alone`` has nothing but the robot.
     """
-    acted = dict[int, list[int]]()
-    for k in range(model.nu):
-        if (joint := joint_of(model, k)) is not None and int(model.jnt_type[joint]) in UNITS:
-            acted.setdefault(joint, []).append(k)
+    able, acts_on = movable(model), [joint_of(model, k) for k in range(model.nu)]
     if servos == "file":
         return []
     if servos == "auto" and model.nu:
-        return [joint for joint, actuators in acted.items() if not any(is_servo(model, k) for k in actuators)]
-    movable = [k for k in range(model.njnt) if int(model.jnt_type[k]) in UNITS]
-    chosen = {*acted, *(k for _, body in pulled(model) for k in joints_above(model, body) if k in movable)}
-    if chosen:
-        return sorted(chosen)
-    roots = [int(model.body_rootid[model.jnt_bodyid[k]]) for k in movable]
-    sizes = Counter(roots)
-    wanted = {root for root, k in zip(roots, movable, strict=True) if model.joint(k).name in joints}
+        served = {acts_on[k] for k in range(model.nu) if is_servo(model, k)}
+        return [joint for joint in dict.fromkeys(acts_on) if joint in able and joint not in served]
+    pulled_by = {k for _, body in pulled(model) for k in joints_above(model, body)}
+    if chosen := [k for k in able if k in acts_on or k in pulled_by]:
+        return chosen
+    root_of = {k: int(model.body_rootid[model.jnt_bodyid[k]]) for k in able}
+    sizes = Counter(root_of.values())
+    wanted = {root for k, root in root_of.items() if model.joint(k).name in joints}
     wanted = wanted or {root for root, size in sizes.items() if alone or size == max(sizes.values())}
-    return [k for root, k in zip(roots, movable, strict=True) if root in wanted]
+    return [k for k, root in root_of.items() if root in wanted]
 
 
 def serve(
@@ -70,16 +67,12 @@ def serve(
         spec.delete(spec.equalities[k])
     motors = dict[str, mujoco.MjsActuator]()
     for k, actuator in reversed([*enumerate(spec.actuators)]):
-        joint = joint_of(model, k)
-        if joint in chosen:
+        if joint_of(model, k) in chosen:
             if actuator.target in motors:
                 spec.delete(motors[actuator.target])
-            motors[actuator.target] = actuator
-            if (effort := _effort(model, k)) and not model.jnt_actfrclimited[joint]:
-                spec.joint(actuator.target).actfrcrange, spec.joint(actuator.target).actfrclimited = (
-                    [-effort, effort],
-                    1,
-                )
+            motors[actuator.target], joint = actuator, spec.joint(actuator.target)
+            if (effort := _effort(model, k)) and not model.jnt_actfrclimited[joint_of(model, k)]:
+                joint.actfrcrange, joint.actfrclimited = [-effort, effort], 1
     for name in names:
         spec.joint(name).actgravcomp = 1
     for key in spec.keys:  # its commands are those of motors
@@ -124,8 +117,5 @@ def _burdens(model: mujoco.MjModel, chosen: Sequence[int]) -> tuple[Array, Array
             data.qpos[model.jnt_qposadr[k]] = low + shares[k] * (high - low)
         mujoco.mj_forward(model, data)
         loads = np.maximum(loads, np.abs(data.qfrc_bias - data.qfrc_gravcomp - data.qfrc_spring))
-        for dof, unit in enumerate(np.eye(model.nv)):
-            product = np.empty(model.nv)
-            mujoco.mj_mulM(model, data, product, unit)
-            inertias[dof] = max(inertias[dof], product[dof])
+        inertias = np.maximum(inertias, data.M[model.M_rowadr + model.M_rownnz - 1])  # the diagonal ends each row
     return inertias, loads + model.dof_frictionloss
