@@ -81,10 +81,9 @@ def build(config: Config, record: Path | None = None) -> RunParts:
     task = task_of(config)
     robot, readers = task.environment, dict[str, Callable[..., Any]](benchmark=benchmark_of)
     config = config.with_found(robot.found_options if isinstance(robot, FromFiles) else {})
-    if config.at_once > 1:
-        from sgimd_torch.runs.at_once import check_at_once  # most runs have one robot
-
-        check_at_once(robot, config.at_once)
+    most = getattr(robot, "at_once", config.at_once)  # of the driver of a single robot, for example
+    if config.at_once > most:
+        raise ValueError(f"at_once must be at most {most}, the at_once of {type(robot).__name__}, got {config.at_once}")
     own = [config.constructor("teacher")] if config.teaching == "teacher" else []
     asked = {word: load_word("teachers", word) for word in config.asked}
     if any(map(_needs_demonstrations, (*own, *asked.values()))):

@@ -6,7 +6,6 @@ evaluations.after(500)["own"].mean_error
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -57,9 +56,7 @@ class Evaluations:
     def first_missing(self) -> float:
         """Number of movements before the first requested evaluation that is not in the record; infinite: none."""
         config = self.parts.config
-        return next(
-            (m for m in config.evaluations if not any(config.due(made, [m]) for made in self._by_movements)), math.inf
-        )
+        return config.first_missing(self._by_movements, config.evaluations)
 
     def after(self, movements: int) -> ByInverse | None:
         """The recorded evaluation after this number of movements, else a new evaluation of the present learner.
