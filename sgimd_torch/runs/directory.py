@@ -227,9 +227,10 @@ def versions_of(parts: RunParts) -> dict[str, Any]:
 
     ``commit`` is None outside a git repository and ends in "-dirty" if files have changed.
     """
-    describe = ["git", "-C", Path(__file__).parent, "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"]
+    describe, here = "git describe --always --dirty --abbrev=40 --exclude=*".split(), Path(__file__).parent
     try:
-        commit = subprocess.run(describe, capture_output=True, text=True, check=True, timeout=10).stdout.strip()
+        done = subprocess.run(describe, cwd=here, capture_output=True, text=True, check=True, timeout=10)
+        commit = done.stdout.strip()
     except (OSError, subprocess.SubprocessError):
         commit = None
     trained = parts.learner.problem.trained

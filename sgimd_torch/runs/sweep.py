@@ -195,13 +195,8 @@ def _in_name(option: str, value: str) -> str:
     return value if option == "algorithm" else f"{option}={Path(value).name if os.sep in value else value}"
 
 
-def is_count(text: str) -> bool:
-    """Whether a text is a whole number; Python reads the digits of all scripts."""
-    return text.isascii() and text.isdecimal()
-
-
 def _count(text: str) -> int:
-    if not is_count(text) or int(text) < 1:
+    if not re.fullmatch(r"0*[1-9]\d*", text, re.ASCII):
         raise argparse.ArgumentTypeError(f"must be a whole number of at least 1, got {text!r}")
     return int(text)
 
@@ -209,10 +204,10 @@ def _count(text: str) -> int:
 def _seeds(text: str) -> list[int]:
     seeds: dict[int, None] = {}
     for part in text.split(","):
-        first, dash, last = part.partition("-")
-        if not is_count(first) or (dash and not is_count(last)) or int(last or first) < int(first):
+        ends = re.fullmatch(r"(\d+)(?:-(\d+))?", part, re.ASCII)  # Python reads the digits of all scripts
+        numbers = range(int(ends[1]), int(ends[2] or ends[1]) + 1) if ends else ()
+        if not numbers:
             raise argparse.ArgumentTypeError(f"must be like 5, 0-19 or 0,3,7-9, got {text!r}")
-        numbers = range(int(first), int(last or first) + 1)
         if len(numbers) > MOST_SEEDS:
             raise argparse.ArgumentTypeError(f"are at most {MOST_SEEDS}, got {text}")
         seeds |= dict.fromkeys(numbers)
