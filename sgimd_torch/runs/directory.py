@@ -227,7 +227,7 @@ def versions_of(parts: RunParts) -> dict[str, Any]:
 
     ``commit`` is None outside a git repository and ends in "-dirty" if files have changed.
     """
-    describe, here = "git describe --always --dirty --abbrev=40 --exclude=*".split(), Path(__file__).parent
+    describe, here = ["git", "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"], Path(__file__).parent
     try:
         done = subprocess.run(describe, cwd=here, capture_output=True, text=True, check=True, timeout=10)
         commit = done.stdout.strip()
