@@ -164,7 +164,12 @@ def _reopened(path: Path, about: dict[str, Any], dims: Dims, parts: RunParts, no
         if not parts.learner.problem.trained:
             for table in OF_MODEL:
                 record.replace_rows(table, ())
-        about["versions"] = _with_earlier(record.about["versions"], about["versions"], notes)
+        versions = record.about["versions"]
+        earlier = versions.pop("before", [])
+        if changes := changed_versions(versions, about["versions"]):
+            notes.append(f"resumed with other versions: {changes}; only new movements and evaluations use them")
+            earlier = [*earlier, versions]
+        about["versions"] |= {"before": earlier} if earlier else {}
         record.about |= about
     except BaseException:
         record.close()
@@ -204,15 +209,6 @@ def _refuse_other(record: Record, about: dict[str, Any], dims: Dims) -> set[str]
         was = f"dims {record.dims} of context, theta and outcome, the robot now has {dims}"
         raise RunError(f"{record.path} was recorded with {was}; is this another robot?")
     return {*others}
-
-
-def _with_earlier(old: dict[str, Any], now: dict[str, Any], notes: list[str]) -> dict[str, Any]:
-    """The versions ``now``, and under "before" the different versions of earlier parts of the run."""
-    earlier = old.pop("before", [])
-    if changes := changed_versions(old, now):
-        notes.append(f"resumed with other versions: {changes}; only new movements and evaluations use them")
-        earlier = [*earlier, old]
-    return {**now, "before": earlier} if earlier else now
 
 
 def changed_versions(old: Mapping[str, Any], now: Mapping[str, Any]) -> str:
