@@ -81,9 +81,10 @@ def build(config: Config, record: Path | None = None) -> RunParts:
     task = task_of(config)
     robot = task.environment
     config = config.with_found(robot.found_options if isinstance(robot, FromFiles) else {})
-    most = getattr(robot, "at_once", config.at_once)  # of the driver of a single robot, for example
-    if config.at_once > most:
-        raise ValueError(f"at_once must be at most {most}, the at_once of {type(robot).__name__}, got {config.at_once}")
+    if config.at_once > 1:
+        from sgimd_torch.runs.at_once import check_at_once  # most runs have one robot
+
+        check_at_once(robot, config.at_once)
     benchmark, notes, crc32 = benchmark_of(task, config.benchmark)
     data = {"benchmark_crc32": crc32, "demonstrations_crc32": None, "begin_with_crc32": None}
     own = [config.constructor("teacher")] if config.teaching == "teacher" else []

@@ -20,7 +20,7 @@ from sgimd_torch.environments.sketch import traced
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.options.build import build
 from sgimd_torch.options.command_line import main, parse
-from sgimd_torch.record.saving import save_life
+from sgimd_torch.record.replay import save_life
 from sgimd_torch.runs.load import load_learner
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.run import RunLoop

@@ -11,7 +11,7 @@ from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.learner.events import Event, Kind
 from sgimd_torch.options.command_line import parse
 from sgimd_torch.record import DERIVED, Record, RunError
-from sgimd_torch.record.saving import save_life
+from sgimd_torch.record.replay import save_life
 from sgimd_torch.runs.directory import RUN_FILE
 from sgimd_torch.runs.read import config_of, find_runs, finished, movements_on_disk, read_run
 from sgimd_torch.spaces import Demonstration
