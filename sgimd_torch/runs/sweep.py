@@ -31,6 +31,7 @@ from typing import Final
 from sgimd_torch.files import make_folder
 from sgimd_torch.options.command_line import parse
 from sgimd_torch.options.config import Config, dashed
+from sgimd_torch.runs.directory import build_again, record_of
 from sgimd_torch.runs.parallel import Engine, Machine, sweep
 from sgimd_torch.runs.read import finished, movements_on_disk
 from sgimd_torch.runs.signals import loading, parser_of, say
@@ -79,8 +80,6 @@ def run_all(whole: Sequence[Config], options: argparse.Namespace, out: Path) -> 
             print(f"{config.directory}: {movements_on_disk(config.directory)} of {config.movements} movements")
     if options.dry_run or not left:
         return 0
-    with loading():
-        from sgimd_torch.runs.directory import build_again, record_of  # imported here so that --help is fast
     for config in {config.directory.parent: config for config in left}.values():
         build_again(config, record_of(config))  # wrong options raise an error before any run starts
     engine = engine_of(options)
