@@ -68,9 +68,7 @@ def _recorded(path: Path, robot: Environment, dims: Dims) -> Iterator[Row]:
             box = boxes[name]
             if recorded.unit != box.unit:
                 raise RunError(f"{name} of {path} are in {recorded.unit or 'no unit'}, here in {box.unit or 'no unit'}")
-            if name != "outcomes" and not (
-                np.array_equal(recorded.low, box.low) and np.array_equal(recorded.high, box.high)
-            ):
+            if name != "outcomes" and not np.array_equal([recorded.low, recorded.high], [box.low, box.high]):
                 raise RunError(
                     f"{name} of {path} lie in {recorded.low} to {recorded.high}, here in {box.low} to {box.high}"
                 )
