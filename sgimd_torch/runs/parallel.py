@@ -159,12 +159,9 @@ def log_of(job: Job) -> Path:
 
 
 def check_end(job: Job, code: int, said: bytes) -> None:
-    """Raise an error with the last line of the output if a run did not end well.
+    """Raise an error with the last line that the process of a job ``said`` if the job did not end well.
 
-    Args:
-        job: the job.
-        code: exit code of its process; if negative, the signal that killed it.
-        said: output of its process.
+    A negative exit ``code`` is the signal that killed the process.
 
     Raises:
         Failed: the run failed.
