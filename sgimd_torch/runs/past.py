@@ -72,9 +72,9 @@ def _recorded(path: Path, robot: Environment, dims: Dims) -> Iterator[Row]:
                 raise RunError(
                     f"{name} of {path} lie in {recorded.low} to {recorded.high}, here in {box.low} to {box.high}"
                 )
+        goal, outcome = sum(dims[:2]), sum(dims)  # their first columns, after those of context and theta
         for _, kind, _, *cells in record.rows("events"):
             if kind in (Kind.MOVED, Kind.ADDED):
-                goal, outcome = sum(dims[:2]), sum(dims)
                 yield *cells[:goal], *cells[outcome : outcome + dims[2]]
 
 
