@@ -35,8 +35,8 @@ from .parts import Inverse as Inverse
 from .parts import Problem as Problem
 from .parts import Search as Search
 from .parts import Teacher as Teacher
-from .record.saving import load_life as load_life
-from .record.saving import save_life as save_life
+from .record.replay import load_life as load_life
+from .record.replay import save_life as save_life
 from .runs.load import load_learner as load_learner
 from .searches.perturb import Perturb as Perturb
 from .searches.simplex import NelderMead as NelderMead

@@ -25,7 +25,7 @@ from sgimd_torch.files import (
     write_text,
 )
 from sgimd_torch.record import Record
-from sgimd_torch.record.saving import save_life
+from sgimd_torch.record.replay import save_life
 from sgimd_torch.runs.past import read_csv
 from sgimd_torch.spaces import Demonstration
 

@@ -19,10 +19,10 @@ from sgimd_torch.memory import Memory
 from sgimd_torch.options import function_of
 from sgimd_torch.options.built import call_checked
 from sgimd_torch.options.catalogue import load_word
-from sgimd_torch.options.config import FILES, OWN, Config
+from sgimd_torch.options.config import OWN, Config
 from sgimd_torch.parts import Demonstrator, Inverse, Teacher
 from sgimd_torch.runs.tasks import Task, benchmark_of
-from sgimd_torch.spaces import stream
+from sgimd_torch.spaces import Demonstration, stream
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,34 +79,33 @@ def build(config: Config, record: Path | None = None) -> RunParts:
         FileNotFoundError: a file does not exist.
     """
     task = task_of(config)
-    robot, readers = task.environment, dict[str, Callable[..., Any]](benchmark=benchmark_of)
+    robot = task.environment
     config = config.with_found(robot.found_options if isinstance(robot, FromFiles) else {})
     if config.at_once > 1:
         from sgimd_torch.runs.at_once import check_at_once  # most runs have one robot
 
         check_at_once(robot, config.at_once)
+    benchmark, notes, crc32 = benchmark_of(task, config.benchmark)
+    data = {"benchmark_crc32": crc32, "demonstrations_crc32": None, "begin_with_crc32": None}
     own = [config.constructor("teacher")] if config.teaching == "teacher" else []
     asked = {word: load_word("teachers", word) for word in config.asked}
+    demonstrations: Sequence[Demonstration] = ()
     if any(map(_needs_demonstrations, (*own, *asked.values()))):
         from sgimd_torch.runs.tasks.taught import demonstrations_of  # not for learners alone
 
-        readers["demonstrations"] = demonstrations_of
+        demonstrations, remarks, data["demonstrations_crc32"] = demonstrations_of(task, config.demonstrations)
+        notes += remarks
+    given = dict[str, Any]()
     if config.begin_with is not None:
         from sgimd_torch.runs.past import past_of  # few runs begin with a past
 
-        readers["begin_with"] = partial(past_of, record=record)
-    contents, notes = dict[str, Any](), list[str]()
-    data: dict[str, str | None] = {f"{name}_crc32": None for name in FILES}
-    for name, read in readers.items():
-        contents[name], remarks, data[f"{name}_crc32"] = read(task, config[name])
+        given["prior"], remarks, data["begin_with_crc32"] = past_of(task, config.begin_with, record)
         notes += remarks
-    prior = contents.get("begin_with")
-    given: dict[str, Any] = {} if prior is None else {"prior": prior}
     teacher, teachers = None, dict[str, Demonstrator]()
     if config.teaching:
         from sgimd_torch.runs.tasks.taught import correspondence_of
 
-        demonstrations, given["correspondence"] = contents.get("demonstrations", ()), correspondence_of(task)
+        given["correspondence"] = correspondence_of(task)
         for make in own:
             teacher = Teacher.of(make, demonstrations, stream(config.seed, "teacher"))
         for word, make in asked.items():
@@ -119,7 +118,7 @@ def build(config: Config, record: Path | None = None) -> RunParts:
     if config.until is not None and not learner.inverse.says_how_sure:
         name = type(learner.inverse).__name__
         raise ValueError(f"--until needs an inverse model that says how sure it is, such as process; {name} does not")
-    parts = RunParts(config, task, learner, teacher, teachers, contents["benchmark"], prior, data, notes)
+    parts = RunParts(config, task, learner, teacher, teachers, benchmark, given.get("prior"), data, notes)
     assert parts.inverses  # made here, so that their remarks are among the notes
     if config.checkpoints and not learner.problem.trained:
         raise ValueError("--checkpoints true needs a forward model, such as --inverse model")

@@ -12,7 +12,7 @@ import importlib.util
 import json
 import math
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -230,6 +230,10 @@ class Config:
     def due(self, movements: int, numbers: Iterable[int]) -> bool:
         """Whether one of ``numbers`` falls into the group of robots that ended after this number of ``movements``."""
         return any(0 <= movements - number < self.at_once for number in numbers)
+
+    def first_missing(self, made: Collection[int], requested: Iterable[int]) -> float:
+        """The first of the ``requested`` moments at which no evaluation was ``made``; infinite if there is none."""
+        return next((number for number in requested if not any(self.due(n, [number]) for n in made)), math.inf)
 
     def _unknown(self, name: str) -> ValueError:
         """The error for an option that this run does not have."""

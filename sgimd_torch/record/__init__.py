@@ -19,7 +19,7 @@ import sqlite3
 import zlib
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager, suppress
+from contextlib import AbstractContextManager, closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final, Self
 
@@ -49,7 +49,7 @@ _LOCAL: Final = {"ext2", "ext3", "ext4", "xfs", "btrfs", "tmpfs", "overlay", "zf
 _ROWS_AT_ONCE: Final = 4096  # number of rows that one query reads
 
 
-class Record:
+class Record(AbstractContextManager["Record"]):
     """An existing record, open for reading and, on request, for writing; a context manager.
 
     A reader copies the file into its memory at once. So it keeps no lock, and sees one state of the file. A writer
@@ -105,9 +105,6 @@ class Record:
         except sqlite3.Error as error:
             raise OSError(f"{path} cannot be written: {error}") from error
         return cls(path, write=True)
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()

@@ -98,8 +98,7 @@ def movements_after(movement: int, kind: str) -> int:
 
 def demonstration_row(demonstration: Demonstration, dims: Dims) -> Row:
     """The row of a demonstration."""
-    times = np.asarray(demonstration.times, dtype=np.float64)
-    trajectory = np.asarray(demonstration.trajectory, dtype=np.float64)
+    times, trajectory = demonstration.times, demonstration.trajectory
     vectors = *_cells(demonstration.context, dims[0]), *_cells(demonstration.outcome, dims[2])
     return *vectors, trajectory.shape[1], times.tobytes(), trajectory.tobytes()
 

@@ -75,8 +75,8 @@ def _begin(make: Callable[[], Any], seed: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     from multiprocessing import parent_process
 
-    parent = parent_process()
-    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+    parent: Any = parent_process()
+    threading.Thread(target=lambda: parent.join() or os._exit(1), daemon=True).start()
     try:
         made = make()
         _robot = live(made.environment if isinstance(made, Task) else made, seed)
@@ -91,8 +91,3 @@ def _fail(reason: str, *_: object) -> list[Array | Failure]:
 def _execute(index: int, context: Array, theta: Array) -> Array | Failure:
     (outcome,) = _robot([index], [context], [theta])
     return Failure(outcome.reason) if isinstance(outcome, Failure) else outcome  # its cause may not be picklable
-
-
-def _end_with(parent: Any) -> None:
-    parent.join()
-    os._exit(1)

@@ -82,10 +82,7 @@ class Task:
     def __init__(self, client: Client, job: Job) -> None:
         self.job, self.returncode, log = job, 0, os.path.abspath(log_of(job))
         self._submit = partial(client.submit, carry_out, job.program, log, os.getcwd(), pure=False)
-        self._hand_over()
-
-    def _hand_over(self) -> None:
-        self._movements, self.future = movements_on_disk(self.job.directory), self._submit()
+        self._movements, self.future = movements_on_disk(job.directory), self._submit()
 
     def poll(self) -> int | None:
         """The exit code of the run, or None.
@@ -100,8 +97,9 @@ class Task:
         except CancelledError as error:
             raise Failed("the scheduler is gone; all runs are kept, and the same command continues them") from error
         except KilledWorker:  # several workers have died during this run
-            if movements_on_disk(self.job.directory) > self._movements:
-                self._hand_over()
+            before, self._movements = self._movements, movements_on_disk(self.job.directory)
+            if self._movements > before:
+                self.future = self._submit()
                 return None
             self.returncode = -signal.SIGKILL
         except Exception as error:

@@ -73,13 +73,13 @@ def open_run(parts: RunParts, *, resume: bool) -> tuple[Record, list[str]]:
         "ended_early": None,
         "spaces": {n: [b.low.tolist(), b.high.tolist(), b.names, b.unit] for n, b in spaces.items()},
     }
-    dims = robot.contexts.dim, robot.policies.dim, robot.outcomes.dim
+    dims = parts.learner.problem.dims
     if len(os.fsencode(path.resolve())) > LONGEST:
         raise ValueError(
             f"the path {str(path)[:100]}... has more than {LONGEST} bytes; choose a shorter --out or --name"
         )
     make_folder(config.directory)
-    if not holds_run(path):
+    if record_of(config) is None:
         if resume:
             notes.append(f"{path.parent} holds no run yet: the run starts from the beginning")
         record = Record.make(path, dims, about)
@@ -94,19 +94,15 @@ def open_run(parts: RunParts, *, resume: bool) -> tuple[Record, list[str]]:
     return record, notes
 
 
-def holds_run(path: Path) -> bool:
-    """Whether there is a record at ``path``; a process killed at the very beginning leaves an empty file."""
-    return path.is_file() and path.stat().st_size > 0
-
-
 def with_found_earlier(config: Config) -> Config:
     """The settings, with what the robot found by movements when this run began, if the run is on disk."""
     names = {
         f"environment.{name}" for name in getattr(function_of(config.chosen["environment"].make), "FOUND_OPTIONS", ())
     }
-    if not names or not holds_run(config.directory / RUN_FILE):
+    path = record_of(config) if names else None
+    if path is None:
         return config
-    with Record(config.directory / RUN_FILE) as record:
+    with Record(path) as record:
         before = record.about.get("settings", {})
         others = changed_settings(before, config.settings, record.about.get("folder", ""))
     if any(name.startswith("environment") for name in {*others} & config.settings.keys() - names - {*NOT_COMPARED}):
@@ -127,9 +123,9 @@ def changed_settings(before: Mapping[str, Any], now: Mapping[str, Any], folder: 
 
 
 def record_of(config: Config) -> Path | None:
-    """The record of a run, if it is on disk."""
+    """The record of a run, if it is on disk; a process killed at the very beginning leaves an empty file."""
     path = config.directory / RUN_FILE
-    return path if holds_run(path) else None
+    return path if path.is_file() and path.stat().st_size > 0 else None
 
 
 def build_again(config: Config, record: Path | None) -> RunParts:
@@ -168,7 +164,12 @@ def _reopened(path: Path, about: dict[str, Any], dims: Dims, parts: RunParts, no
         if not parts.learner.problem.trained:
             for table in OF_MODEL:
                 record.replace_rows(table, ())
-        about["versions"] = _with_earlier(record.about["versions"], about["versions"], notes)
+        versions = record.about["versions"]
+        earlier = versions.pop("before", [])
+        if changes := changed_versions(versions, about["versions"]):
+            notes.append(f"resumed with other versions: {changes}; only new movements and evaluations use them")
+            earlier = [*earlier, versions]
+        about["versions"] |= {"before": earlier} if earlier else {}
         record.about |= about
     except BaseException:
         record.close()
@@ -181,17 +182,11 @@ def _forget_evaluations(
 ) -> None:
     """Drop evaluations that are not requested, and all after the first missing one; with ``anew``, drop all."""
     made = list(dict.fromkeys(movements for movements, *_ in record.rows("evaluations")))
-    ended = record.about["settings"]["movements"]  # if this run ends later, the noise is not measured here
-    longer = config.floor_at is None and ended != config.movements
     requested = sorted({*config.evaluations, *(ended_early or [])[:1]})
-    kept, left = list[int](), requested
-    for movements in made:
-        if anew or not config.due(movements, requested) or (longer and movements == ended):
-            continue
-        if not config.due(movements, left[:1]):
-            break
-        kept.append(movements)
-        left = [wanted for wanted in left if wanted > movements]
+    kept = [] if anew else [n for n in made if n < config.first_missing(made, requested) and config.due(n, requested)]
+    ended = record.about["settings"]["movements"]
+    if config.floor_at is None and ended != config.movements:  # this run ends later, so noise is not measured there
+        kept = [movements for movements in kept if movements != ended]
     if others := [str(movements) for movements in made if movements not in kept]:
         notes.append(f"evaluations after {', '.join(others)} movements are dropped, or repeated if requested")
         for table in EVALUATED:
@@ -216,15 +211,6 @@ def _refuse_other(record: Record, about: dict[str, Any], dims: Dims) -> set[str]
     return {*others}
 
 
-def _with_earlier(old: dict[str, Any], now: dict[str, Any], notes: list[str]) -> dict[str, Any]:
-    """The versions ``now``, and under "before" the different versions of earlier parts of the run."""
-    earlier = old.pop("before", [])
-    if changes := changed_versions(old, now):
-        notes.append(f"resumed with other versions: {changes}; only new movements and evaluations use them")
-        earlier = [*earlier, old]
-    return {**now, "before": earlier} if earlier else now
-
-
 def changed_versions(old: Mapping[str, Any], now: Mapping[str, Any]) -> str:
     """The versions that differ, such as "torch 2.5.1 -> 2.6.0"; "" if none does."""
     return ", ".join(
@@ -233,10 +219,28 @@ def changed_versions(old: Mapping[str, Any], now: Mapping[str, Any]) -> str:
 
 
 def versions_of(parts: RunParts) -> dict[str, Any]:
-    """Versions of all that a run depends on, and the device that trains its forward model."""
+    """Versions of all that a run depends on, and the device that trains its forward model.
+
+    ``commit`` is None outside a git repository and ends in "-dirty" if files have changed.
+    """
+    describe, here = ["git", "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"], Path(__file__).parent
+    try:
+        done = subprocess.run(describe, cwd=here, capture_output=True, text=True, check=True, timeout=10)
+        commit = done.stdout.strip()
+    except (OSError, subprocess.SubprocessError):
+        commit = None
     trained = parts.learner.problem.trained
     devices = [("device", part.device) for part in trained if part.device]
-    return {**versions(forward=bool(trained)), **dict(devices), **sources(parts.config, parts.environment)}
+    libraries = (*LIBRARIES, *FORWARD) if trained else LIBRARIES
+    return {
+        "python": platform.python_version(),
+        **{name.removesuffix("-cpu"): importlib.metadata.version(name) for name in libraries},
+        "sgimd_torch": sgimd_torch.__version__,
+        "platform": platform.platform(),
+        "commit": commit,
+        **dict(devices),
+        **sources(parts.config, parts.environment),
+    }
 
 
 def sources(config: Config, robot: Environment) -> dict[str, str]:
@@ -256,26 +260,3 @@ def code_of(settings: Mapping[str, Any]) -> list[str]:
     named = [value for name, value in settings.items() if name.rpartition(".")[2] in CODE]
     words = [word for value in named for word in (value if isinstance(value, list) else [value])]
     return sorted({word for word in words if isinstance(word, str) and ":" in word and word not in PLACES})
-
-
-def versions(*, forward: bool) -> dict[str, Any]:
-    """Versions of Python, the libraries, this package and the platform, and the git commit.
-
-    ``commit`` is None outside a git repository and ends in "-dirty" if files have changed.
-
-    Args:
-        forward: whether to include the libraries of a forward model, which other runs do not need.
-    """
-    folder = str(Path(__file__).parent)
-    describe = ["git", "-C", folder, "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"]
-    try:
-        commit = subprocess.run(describe, capture_output=True, text=True, check=True, timeout=10).stdout.strip()
-    except (OSError, subprocess.SubprocessError):
-        commit = None
-    return {
-        "python": platform.python_version(),
-        **{name.removesuffix("-cpu"): importlib.metadata.version(name) for name in (*LIBRARIES, *FORWARD * forward)},
-        "sgimd_torch": sgimd_torch.__version__,
-        "platform": platform.platform(),
-        "commit": commit,
-    }

@@ -6,10 +6,9 @@ evaluations.after(500)["own"].mean_error
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,9 +16,6 @@ from sgimd_torch.evaluation import Evaluation, evaluate
 from sgimd_torch.options.build import RunParts
 from sgimd_torch.options.config import OWN
 from sgimd_torch.record import Record
-
-if TYPE_CHECKING:
-    from sgimd_torch.goals.regions import Region
 
 ByInverse = Mapping[str, Evaluation]
 """The evaluation of each inverse model, by name, the run's own inverse model first."""
@@ -57,9 +53,7 @@ class Evaluations:
     def first_missing(self) -> float:
         """Number of movements before the first requested evaluation that is not in the record; infinite: none."""
         config = self.parts.config
-        return next(
-            (m for m in config.evaluations if not any(config.due(made, [m]) for made in self._by_movements)), math.inf
-        )
+        return config.first_missing(self._by_movements, config.evaluations)
 
     def after(self, movements: int) -> ByInverse | None:
         """The recorded evaluation after this number of movements, else a new evaluation of the present learner.
@@ -99,17 +93,14 @@ class Evaluations:
             columns = errors, evaluation.scatter, evaluation.failed.astype(int), evaluation.expected
             rows = zip(range(len(errors)), *columns, evaluation.contexts, strict=True)
             self.record.add_rows("errors", [(movements, word, *numbers, *context) for *numbers, context in rows])
-        self.record.add_rows("regions", [(movements, *_fields(region)) for region in self.parts.learner.regions])
+        for region in self.parts.learner.regions:
+            n = len(region.competences)
+            results = n, float(region.competences.mean()) if n else np.nan, float(region.interest())
+            row = movements, region.path, *region.low, *region.high, region.attempts, *results
+            self.record.add_rows("regions", [row])
 
 
 def _evaluation(numbers: np.ndarray) -> Evaluation:
     unknown = np.full((len(numbers), 0), np.nan)
     errors, noise, failed, expected, *_ = numbers.T
     return Evaluation(errors, unknown, unknown, noise, numbers[:, 4:], failed > 0, expected)
-
-
-def _fields(region: Region) -> Iterator[Any]:
-    n = len(region.competences)
-    yield region.path
-    yield from (*region.low, *region.high)
-    yield from (region.attempts, n, float(region.competences.mean()) if n else np.nan, float(region.interest()))

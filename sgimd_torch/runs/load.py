@@ -12,7 +12,7 @@ from pathlib import Path
 
 from sgimd_torch.learner import Learner
 from sgimd_torch.record import ReplayError
-from sgimd_torch.record.saving import repeated
+from sgimd_torch.record.replay import repeated
 from sgimd_torch.runs.directory import RUN_FILE, build_again, changed_versions, sources, versions_of
 from sgimd_torch.runs.read import config_of, read_run
 from sgimd_torch.runs.run import Listening

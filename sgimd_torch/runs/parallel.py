@@ -11,8 +11,9 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
+from itertools import count
 from pathlib import Path
 from typing import Any, Final, Protocol, TypeVar
 
@@ -107,6 +108,7 @@ def sweep(jobs: Sequence[J], engine: Engine, *, on_end: Callable[[J], None] | No
     failures: dict[J, str] = {}
     waiting, running = [*reversed(jobs)], dict[J, tuple[Any, int]]()
     bar = Progress("sweep", sum(job.movements for job in jobs), sum(done.values()))
+    looks = count(1)
     with Stopping("stopping all runs; the same command continues them") as stopping, bar as progress:
         try:
             while (waiting or running) and not stopping.heard:
@@ -115,7 +117,10 @@ def sweep(jobs: Sequence[J], engine: Engine, *, on_end: Callable[[J], None] | No
                     make_folder(job.directory.parent)
                     before = log_of(job).stat().st_size if log_of(job).exists() else 0
                     running[job] = engine.start(job), before
-                ended = _wait(running, stopping)
+                time.sleep(POLL)
+                ended = [job for job, (run, _) in running.items() if run.poll() is not None]
+                if not ended and next(looks) % REFRESH:
+                    continue
                 done |= {job: _on_disk(job) for job in running}
                 for job in ended:
                     run, before = running.pop(job)
@@ -148,29 +153,15 @@ def start_process(program: Sequence[str], log: Path, *, stdin: int, folder: str 
         )
 
 
-def _wait(running: Mapping[J, tuple[Any, int]], stopping: Stopping) -> list[J]:
-    """The runs that have ended, as soon as there is one; after ``REFRESH`` looks or a signal, perhaps none."""
-    ended: list[J] = []
-    for _ in range(REFRESH):
-        time.sleep(POLL)
-        ended = [job for job, (run, _) in running.items() if run.poll() is not None]
-        if ended or stopping.heard:
-            break
-    return ended
-
-
 def log_of(job: Job) -> Path:
     """The log of a run's output, next to its directory."""
     return job.directory.with_suffix(".log")
 
 
 def check_end(job: Job, code: int, said: bytes) -> None:
-    """Raise an error with the last line of the output if a run did not end well.
+    """Raise an error with the last line that the process of a job ``said`` if the job did not end well.
 
-    Args:
-        job: the job.
-        code: exit code of its process; if negative, the signal that killed it.
-        said: output of its process.
+    A negative exit ``code`` is the signal that killed the process.
 
     Raises:
         Failed: the run failed.

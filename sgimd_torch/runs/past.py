@@ -16,11 +16,9 @@ from sgimd_torch.files import LARGE, check_regular, checksum, is_record
 from sgimd_torch.learner.events import Kind
 from sgimd_torch.memory import Memory
 from sgimd_torch.options.signature import parsed
-from sgimd_torch.record import Record, RunError
+from sgimd_torch.record import Dims, Record, Row, RunError
 from sgimd_torch.runs.tasks import Task
-from sgimd_torch.spaces import Array, Box, check_vector
-
-Exemplar = tuple[Array, Array, Array]
+from sgimd_torch.spaces import Box, check_vector
 
 
 def past_of(task: Task, path: Path, record: Path | None = None) -> tuple[Memory, list[str], str]:
@@ -38,36 +36,29 @@ def past_of(task: Task, path: Path, record: Path | None = None) -> tuple[Memory,
         ValueError: the file is damaged or has no movements, or its robot has other dimensions, units or bounds.
         OSError: the file cannot be read.
     """
-    robot, exemplars, crc32 = task.environment, list[Exemplar](), ""
+    robot, exemplars, crc32 = task.environment, list[Row](), ""
+    dims = robot.contexts.dim, robot.policies.dim, robot.outcomes.dim
     if record is not None:
-        exemplars, crc32 = _kept(record, robot)
+        with Record(record) as kept:
+            exemplars = [*kept.rows("prior")] if kept.dims == dims else []
+            crc32 = kept.about.get("files", {}).get("begin_with_crc32")
     if not exemplars or path.exists():
         crc32 = checksum(path)
     if not exemplars:
-        exemplars = list(_recorded(path, robot) if is_record(path) else _listed(path, robot))
+        exemplars = list(_recorded(path, robot, dims) if is_record(path) else _listed(path, robot))
     if not exemplars:
         raise RunError(f"{path} holds no movements to begin with")
-    contexts, thetas, outcomes = (np.stack(column) for column in zip(*exemplars, strict=True))
+    contexts, thetas, outcomes = np.split(np.array(exemplars, dtype=np.float64), np.cumsum(dims)[:2], axis=1)
     robot.contexts.check(f"contexts of {path}", contexts)
     robot.policies.check(f"thetas of {path}", thetas)
-    memory = Memory(robot.contexts.dim, robot.policies.dim, robot.outcomes.dim)
+    memory = Memory(*dims)
     memory.extend(contexts, thetas, check_vector(f"outcomes of {path}", outcomes, robot.outcomes.dim))
     return memory, [f"begins with {len(memory)} movements of {path}, as far as they help"], crc32
 
 
-def _kept(path: Path, robot: Environment) -> tuple[list[Exemplar], str]:
-    """The movements with which a run of this robot began, and the checksum of the file from which they came."""
-    c, p, t = robot.contexts.dim, robot.policies.dim, robot.outcomes.dim
-    with Record(path) as record:
-        rows = np.array([*record.rows("prior")]) if record.dims == (c, p, t) else np.empty((0, c + p + t))
-        contexts, thetas, outcomes = np.split(rows.reshape(-1, c + p + t), (c, c + p), axis=1)
-        return [*zip(contexts, thetas, outcomes, strict=True)], record.about.get("files", {}).get("begin_with_crc32")
-
-
-def _recorded(path: Path, robot: Environment) -> Iterator[Exemplar]:
-    """Exemplars of a record; a run says in which boxes, with which units."""
+def _recorded(path: Path, robot: Environment, dims: Dims) -> Iterator[Row]:
+    """Exemplars of a record, context, theta and outcome in a row; a run says in which boxes, with which units."""
     boxes = {"contexts": robot.contexts, "policies": robot.policies, "outcomes": robot.outcomes}
-    dims = robot.contexts.dim, robot.policies.dim, robot.outcomes.dim
     with Record(path) as record:
         if record.dims != dims:
             raise RunError(f"{path} has dims {record.dims} of context, theta, outcome, this robot has {dims}")
@@ -77,40 +68,33 @@ def _recorded(path: Path, robot: Environment) -> Iterator[Exemplar]:
             box = boxes[name]
             if recorded.unit != box.unit:
                 raise RunError(f"{name} of {path} are in {recorded.unit or 'no unit'}, here in {box.unit or 'no unit'}")
-            if name != "outcomes" and not (
-                np.array_equal(recorded.low, box.low) and np.array_equal(recorded.high, box.high)
-            ):
+            if name != "outcomes" and not np.array_equal([recorded.low, recorded.high], [box.low, box.high]):
                 raise RunError(
                     f"{name} of {path} lie in {recorded.low} to {recorded.high}, here in {box.low} to {box.high}"
                 )
-        for event in record.events():
-            if event.kind in (Kind.MOVED, Kind.ADDED):
-                assert event.context is not None
-                assert event.theta is not None
-                assert event.outcome is not None
-                yield event.context, event.theta, event.outcome
+        goal, outcome = sum(dims[:2]), sum(dims)  # their first columns, after those of context and theta
+        for _, kind, _, *cells in record.rows("events"):
+            if kind in (Kind.MOVED, Kind.ADDED):
+                yield *cells[:goal], *cells[outcome : outcome + dims[2]]
 
 
-def _listed(path: Path, robot: Environment) -> Iterator[Exemplar]:
-    """Exemplars of a csv file; other columns do not matter."""
+def _listed(path: Path, robot: Environment) -> Iterator[Row]:
+    """Exemplars of a csv file, context, theta and outcome in a row; other columns do not matter."""
     boxes = {"context": robot.contexts, "theta": robot.policies, "outcome": robot.outcomes}
-    wanted = [[f"{name}_{k}" for k in range(box.dim)] for name, box in boxes.items()]
-    all_wanted = [name for names in wanted for name in names]
+    wanted = [f"{name}_{k}" for name, box in boxes.items() for k in range(box.dim)]
     (_, heads), *rows = read_csv(path) or [(1, [])]
-    faults = [f"lacks the column {name}" for name in all_wanted if name not in heads]
-    faults += [f"has two columns {name}" for name in all_wanted if heads.count(name) > 1]
+    faults = [f"lacks the column {name}" for name in wanted if name not in heads]
+    faults += [f"has two columns {name}" for name in wanted if heads.count(name) > 1]
     more = [f"{name}_{box.dim}" for name, box in boxes.items()]
     faults += [f"has a column {name}, so it is of another robot" for name in more if name in heads]
     if faults:
-        raise RunError(f"{path} {faults[0]}; this robot needs {', '.join(all_wanted)}")
+        raise RunError(f"{path} {faults[0]}; this robot needs {', '.join(wanted)}")
     for number, row in rows:
         cells = dict(zip(heads, row, strict=False))
         try:
-            numbers = ([parsed(cells.get(name, ""), float) for name in names] for names in wanted)
-            context, theta, outcome = map(np.array, numbers)
+            yield tuple(parsed(cells.get(name, ""), float) for name in wanted)
         except ValueError as error:
-            raise RunError(f"{path}: line {number} is no movement of {len(all_wanted)} numbers") from error
-        yield context, theta, outcome
+            raise RunError(f"{path}: line {number} is no movement of {len(wanted)} numbers") from error
 
 
 def read_csv(path: Path) -> list[tuple[int, list[str]]]:

@@ -22,7 +22,14 @@ from sgimd_torch.learner.events import Kind
 from sgimd_torch.options.config import FILES, OWN, Config
 from sgimd_torch.record import DERIVED, Record, RunError
 from sgimd_torch.record.layout import layout
-from sgimd_torch.runs.directory import NOT_COMPARED, RUN_FILE, changed_settings, code_of, with_found_earlier
+from sgimd_torch.runs.directory import (
+    NOT_COMPARED,
+    OF_MODEL,
+    RUN_FILE,
+    changed_settings,
+    code_of,
+    with_found_earlier,
+)
 from sgimd_torch.spaces import Array, Box, Demonstration
 
 Columns = dict[str, np.ndarray]
@@ -94,17 +101,14 @@ class Run:
         """Columns of the evaluations of the run's own inverse model."""
         return self.evaluations[OWN]
 
-    def at(self, movements: int, column: str = "mean_error", inverse: str = OWN) -> float:
+    def at(self, movements: int, column: str = "mean_error") -> float:
         """One number of the evaluation after ``movements`` movements, NaN if there is no such evaluation."""
-        evaluation = self.evaluations.get(inverse)
-        if evaluation is None:
-            return float("nan")
-        values = evaluation[column][evaluation["movements"] == movements]
+        values = self.evaluation[column][self.evaluation["movements"] == movements]
         return float(values[0]) if len(values) else float("nan")
 
-    def missed_by(self, movements: int, inverse: str = OWN) -> tuple[Array, Array]:
+    def missed_by(self, movements: int) -> tuple[Array, Array]:
         """Errors ``(n_goals,)`` of an evaluation, and those that the learner expected; NaN: it did not say."""
-        now = (self.errors["movements"] == movements) & (self.errors["inverse"] == inverse)
+        now = (self.errors["movements"] == movements) & (self.errors["inverse"] == OWN)
         return self.errors["error"][now], self.errors["expected"][now]
 
     def own_goals(self) -> OwnGoals:
@@ -154,7 +158,7 @@ def read_run(path: str | os.PathLike[str]) -> Run:
             raise RunError(f"{path} holds a run of seed {settings['seed']}; was it copied from another run?")
         demonstrations = record.demonstrations()
         arrays, requests = _lived(record)
-        derived: dict[str, Columns] = {table: _columns(record, table) for table in DERIVED}
+        derived: dict[str, Any] = {table: _columns(record, table) for table in DERIVED}
         n = record.movements
     evaluated = derived["evaluations"]["movements"]
     is_empty = not demonstrations and not np.isfinite(arrays["outcomes"]).any()  # an empty memory is not evaluated
@@ -184,15 +188,9 @@ def read_run(path: str | os.PathLike[str]) -> Run:
             errors=derived["errors"],
             benchmark=np.stack(list(derived["goals"].values())[1:], axis=1),
             demonstrations=demonstrations,
-            regions=_if_any(derived["regions"]),
-            predictions=_if_any(derived["predictions"]),
-            refreshes=_if_any(derived["refreshes"]),
             requests=requests,
+            **{table: derived[table] for table in ("regions", *OF_MODEL) if min(map(len, derived[table].values()))},
         )
-
-
-def _if_any(columns: Columns) -> Columns | None:
-    return columns if len(next(iter(columns.values()))) else None
 
 
 def _lived(record: Record) -> tuple[dict[str, Any], Columns | None]:

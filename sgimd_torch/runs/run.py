@@ -13,7 +13,7 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext, supp
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Final, Protocol, Self, runtime_checkable
+from typing import Any, Final, Protocol, runtime_checkable
 
 from sgimd_torch.environments.protocol import FAILURES, Environment, SimulationError, moves_in_batches, reason_of
 from sgimd_torch.evaluation import Evaluation
@@ -67,7 +67,7 @@ def run_one(parts: RunParts, stopping: Stopping, *, resume: bool, again: str) ->
         return loop.summary
 
 
-class RunLoop:
+class RunLoop(AbstractContextManager["RunLoop"]):
     """A run under way. Each movement is recorded, then told to the listeners; then there may be an evaluation.
 
     It is a context manager. Leaving it writes the last movements to the disk, except after Ctrl-C.
@@ -107,9 +107,6 @@ class RunLoop:
         self._committed_at, self._kept, self._told = time.monotonic(), self.recorded, False  # at the last commit
         self._remarked = {*self.record.about.setdefault("remarks", {})}  # kinds of remarks that were told
 
-    def __enter__(self) -> Self:
-        return self
-
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         broken_off = kind is not None and issubclass(kind, KeyboardInterrupt)
         with suppress(*([] if kind is None else [OSError])):  # a full disk: the first error is raised
@@ -133,17 +130,16 @@ class RunLoop:
     @property
     def summary(self) -> str:
         """Result of the run, as one line."""
-        last, result = self.evaluations.last, "not evaluated"
+        last, result, amount = self.evaluations.last, "not evaluated", self.parts.environment.outcomes.amount
         if last is not None:
             floor = last.noise_floor
-            amount = self.parts.environment.outcomes.amount
             measured = "not measured" if math.isnan(floor) else amount(floor, ".4f")
             result = f"mean error {amount(last.mean_error, '.4f')}, noise floor {measured}"
             if last.failed.any():
                 result += f" ({last.failed.sum()} of {len(last.failed)} movements of the evaluation failed)"
         failed = f" ({self.failed} failed)" if self.failed else ""
-        ended_early, unit = self.record.about["ended_early"], self.parts.environment.outcomes.amount
-        early = f", ended early as it expected {unit(ended_early[1], '.4f')}" if ended_early else ""
+        ended_early = self.record.about["ended_early"]
+        early = f", ended early as it expected {amount(ended_early[1], '.4f')}" if ended_early else ""
         return f"{self.parts.config.directory}: {self.movements} movements{failed}, {result}{early}"
 
     def go_on(self, stopping: Stopping) -> None:

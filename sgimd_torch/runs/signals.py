@@ -185,7 +185,7 @@ class Stopping:
             os.write(2, f"\n{self._message}\n".encode())
 
 
-class Progress:
+class Progress(AbstractContextManager["Progress"]):
     """A context manager: a progress bar on a terminal; elsewhere, a plain line now and then.
 
     Args:
@@ -197,9 +197,6 @@ class Progress:
     def __init__(self, title: str, total: int, done: int = 0) -> None:
         self._bar: Any = None
         self.begin(title, total, done)
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._bar.close()

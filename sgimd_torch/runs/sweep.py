@@ -31,6 +31,7 @@ from typing import Final
 from sgimd_torch.files import make_folder
 from sgimd_torch.options.command_line import parse
 from sgimd_torch.options.config import Config, dashed
+from sgimd_torch.runs.directory import build_again, record_of
 from sgimd_torch.runs.parallel import Engine, Machine, sweep
 from sgimd_torch.runs.read import finished, movements_on_disk
 from sgimd_torch.runs.signals import loading, parser_of, say
@@ -79,8 +80,6 @@ def run_all(whole: Sequence[Config], options: argparse.Namespace, out: Path) -> 
             print(f"{config.directory}: {movements_on_disk(config.directory)} of {config.movements} movements")
     if options.dry_run or not left:
         return 0
-    with loading():
-        from sgimd_torch.runs.directory import build_again, record_of  # imported here so that --help is fast
     for config in {config.directory.parent: config for config in left}.values():
         build_again(config, record_of(config))  # wrong options raise an error before any run starts
     engine = engine_of(options)
@@ -195,13 +194,8 @@ def _in_name(option: str, value: str) -> str:
     return value if option == "algorithm" else f"{option}={Path(value).name if os.sep in value else value}"
 
 
-def is_count(text: str) -> bool:
-    """Whether a text is a whole number; Python reads the digits of all scripts."""
-    return text.isascii() and text.isdecimal()
-
-
 def _count(text: str) -> int:
-    if not is_count(text) or int(text) < 1:
+    if not re.fullmatch(r"0*[1-9]\d*", text, re.ASCII):
         raise argparse.ArgumentTypeError(f"must be a whole number of at least 1, got {text!r}")
     return int(text)
 
@@ -209,10 +203,10 @@ def _count(text: str) -> int:
 def _seeds(text: str) -> list[int]:
     seeds: dict[int, None] = {}
     for part in text.split(","):
-        first, dash, last = part.partition("-")
-        if not is_count(first) or (dash and not is_count(last)) or int(last or first) < int(first):
+        ends = re.fullmatch(r"(\d+)(?:-(\d+))?", part, re.ASCII)  # Python reads the digits of all scripts
+        numbers = range(int(ends[1]), int(ends[2] or ends[1]) + 1) if ends else ()
+        if not numbers:
             raise argparse.ArgumentTypeError(f"must be like 5, 0-19 or 0,3,7-9, got {text!r}")
-        numbers = range(int(first), int(last or first) + 1)
         if len(numbers) > MOST_SEEDS:
             raise argparse.ArgumentTypeError(f"are at most {MOST_SEEDS}, got {text}")
         seeds |= dict.fromkeys(numbers)

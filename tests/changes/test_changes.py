@@ -18,7 +18,7 @@ from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.learner.events import Kind
 from sgimd_torch.parts import Inverse
-from sgimd_torch.record.saving import load_life, save_life
+from sgimd_torch.record.replay import load_life, save_life
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Failure, stream
 from sgimd_torch.teachers import PeriodicTeacher

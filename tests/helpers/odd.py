@@ -64,9 +64,9 @@ def odd_place(place, *options):
     return place
 
 
-def as_alone(place, out, seeds):
+def as_alone(place, out):
     """Whether the runs in ``out`` equal the undisturbed runs in ``alone``."""
-    places = [f"random/seed-{seed:03d}" for seed in seeds]
+    places = "random/seed-000", "random/seed-001"
     return all(content_of(out / run) == content_of(place / "alone" / run) for run in places)
 
 

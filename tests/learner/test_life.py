@@ -23,7 +23,7 @@ from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.learner.events import Kind
 from sgimd_torch.memory import Memory
 from sgimd_torch.record import Record, ReplayError, RunError
-from sgimd_torch.record.saving import load_life, save_life
+from sgimd_torch.record.replay import load_life, save_life
 from sgimd_torch.rivals.alp_gmm import AlpGmm
 from sgimd_torch.rivals.cma_es import CmaEs
 from sgimd_torch.rivals.quality_diversity import cma_me, map_elites

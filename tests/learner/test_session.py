@@ -12,7 +12,7 @@ from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.inverses.local import LocalInverse
 from sgimd_torch.record import Record
-from sgimd_torch.record.saving import load_life, save_life
+from sgimd_torch.record.replay import load_life, save_life
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Array, Episode, stream
 from sgimd_torch.teachers import InitialTeacher, PeriodicTeacher

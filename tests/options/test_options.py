@@ -7,6 +7,7 @@ import sys
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import get_args, get_origin
 
 import numpy as np
@@ -25,6 +26,7 @@ from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.signals import command
 from sgimd_torch.runs.tasks import MAX_GOALS, goals_all_over
 from sgimd_torch.session import run
+from sgimd_torch.spaces import Box
 
 ENTRIES = [(kind, word) for kind, words in WORDS.items() for word in words]
 TAUGHT = '''
@@ -90,19 +92,13 @@ def test_an_option_of_a_users_goal_model_is_its_parameter_and_nothing_else(own, 
 
 
 def test_goals_all_over_a_space_are_at_most_500_and_inside():
-    class Space:
-        def __init__(self, dim):
-            from sgimd_torch.spaces import Box
-
-            self.outcomes = Box(np.full(dim, -2.0), np.arange(1.0, dim + 1))
-
     for dim in range(1, 7):
-        space = Space(dim)
-        goals = goals_all_over(space).goals
+        box = Box(np.full(dim, -2.0), np.arange(1.0, dim + 1))
+        goals = goals_all_over(SimpleNamespace(outcomes=box)).goals
         assert 200 < len(goals) <= MAX_GOALS
-        assert space.outcomes.contains(goals).all()
+        assert box.contains(goals).all()
         assert len(np.unique(goals, axis=0)) == len(goals)
-        middle, half = (space.outcomes.low + space.outcomes.high) / 2, space.outcomes.sides / 2
+        middle, half = (box.low + box.high) / 2, box.sides / 2
         assert (np.abs(goals.mean(axis=0) - middle) < 0.05 * half).all()  # evenly
 
 

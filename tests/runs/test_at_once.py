@@ -1,8 +1,7 @@
 """Runs of robots that move at once: ``sgimd run --at-once 8``, processes for robots that move one by one, resuming."""
 
+import os
 import signal
-import subprocess
-import sys
 import time
 from functools import partial
 from itertools import pairwise
@@ -11,8 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from runs import content_of
+from runs import LIVE, content_of, start
 from sgimd_torch import session
+from sgimd_torch.options.catalogue import load_word
 from sgimd_torch.record import Record
 from sgimd_torch.runs.at_once import in_processes
 from sgimd_torch.runs.directory import RUN_FILE
@@ -35,7 +35,7 @@ class Odd(PlanarArm):
     def execute(self, context, theta, rng):
         if theta[0] > 0.95:
             raise ConnectionError("stuck")
-        return super().execute(context, theta, rng) + 1e-9 * os.getpid() * 0
+        return super().execute(context, theta, rng)
 class Mortal(PlanarArm):
     execute_many = None
     def execute(self, context, theta, rng):
@@ -60,24 +60,18 @@ class Hanging(PlanarArm):
 
 
 @pytest.fixture
-def own(tmp_path, monkeypatch):
+def own(module):
     """The module of this page's robots, in the working directory."""
-    (tmp_path / "robots_at_once.py").write_text(MODULE)
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.syspath_prepend(tmp_path)
-    import robots_at_once
-
-    yield robots_at_once
-    del sys.modules["robots_at_once"]
+    return module("robots_at_once", MODULE)
 
 
 def test_processes_give_the_outcomes_and_the_failures_of_one_process(own):
-    robot = own.Odd(3, noise=0.1)
+    make = partial(load_word("environment", "robots_at_once:Odd"), 3, noise=0.1)
     thetas = stream(0, "thetas").random((12, 3))
     thetas[5, 0] = 1.0
     batch = range(12), [NO_CONTEXT] * 12, list(thetas)
-    alone = live(robot, 7)(*batch)
-    with in_processes(partial(own.Odd, 3, noise=0.1), 7, 2) as execute:
+    alone = live(make(), 7)(*batch)
+    with in_processes(make, 7, 2) as execute:
         together = execute(*batch)
     assert [isinstance(each, Failure) for each in together] == [k == 5 for k in range(12)]
     for mine, theirs in zip(alone, together, strict=True):
@@ -139,33 +133,30 @@ def test_robots_that_cannot_move_at_once_are_told(go, own, tmp_path, capfd, robo
 
 def test_the_second_ctrl_c_ends_a_run_of_processes_that_hang(own, tmp_path):
     """Whoever waits for them waits for ever."""
-    options = [*RUN, "robots_at_once:Hanging", "--evaluate-at", "[]", "--movements", "500", "--out", str(tmp_path)]
-    with subprocess.Popen([sys.executable, "-m", "sgimd_torch", "run", *options], stderr=subprocess.PIPE) as run:
-        while not (tmp_path / "hangs").exists():
-            assert run.poll() is None
-            time.sleep(0.05)
-        children = children_of(run.pid, 1)
+    with start(LIVE, *RUN, "robots_at_once:Hanging", *UNJUDGED, "--out", tmp_path) as run:
+        until(lambda: children_of(run) and (tmp_path / "hangs").exists())
+        children = children_of(run)
         run.send_signal(signal.SIGINT)
-        assert any(b"Ctrl-C once more" in line for line in run.stderr)
+        assert any("Ctrl-C once more" in line for line in run.stderr)
         run.send_signal(signal.SIGINT)
         assert run.wait() == 130
-    while any(Path(f"/proc/{each}").exists() for each in children):
-        time.sleep(0.05)
+    until(lambda: not any(map(os.path.exists, children)))
 
 
 def test_the_processes_end_with_a_run_that_is_killed(own, tmp_path):
-    options = [*RUN, "robots_at_once:Slow", "--evaluate-at", "[]", "--movements", "5000", "--out", str(tmp_path)]
-    with subprocess.Popen([sys.executable, "-m", "sgimd_torch", "run", *options], stderr=subprocess.PIPE) as run:
-        while not (children := children_of(run.pid)):
-            assert run.poll() is None
-            time.sleep(0.05)
-        run.send_signal(signal.SIGKILL)
-    while any(Path(f"/proc/{each}").exists() for each in children):
+    with start(LIVE, *RUN, "robots_at_once:Slow", *UNJUDGED, "--at-once", 2, "--out", tmp_path) as run:
+        until(lambda: len(children_of(run)) >= 2)
+        children = children_of(run)
+        run.kill()
+    until(lambda: not any(map(os.path.exists, children)))
+
+
+def until(true):
+    while not true():
         time.sleep(0.05)
 
 
-def children_of(pid, least=4):
-    """Processes that were begun by another one, at least so many."""
-    found = Path(f"/proc/{pid}/task/{pid}/children")
-    listed = found.read_text().split() if found.exists() else []
-    return listed if len(listed) >= least else []
+def children_of(process):
+    """Places of the processes that a process has begun, which must not have ended."""
+    assert process.poll() is None
+    return [f"/proc/{pid}" for pid in Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()]

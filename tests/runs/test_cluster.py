@@ -108,7 +108,7 @@ def test_what_a_killed_worker_has_begun_is_resumed_by_workers_that_join_later(da
     said = said_by(sweep, 0)
     assert "2 runs ended well, 0 failed" in said
     assert (tmp_path / "random/seed-000.log").read_text().count("starts from the beginning") == 1
-    assert as_alone(odd, tmp_path, (0, 1))
+    assert as_alone(odd, tmp_path)
 
 
 @pytest.mark.slow
@@ -122,7 +122,7 @@ def test_a_scheduler_that_ends_is_told_in_one_line_and_the_sweep_goes_on_with_an
     dask.file.unlink()
     dask.scheduler(), dask.worker()
     assert "2 runs ended well, 0 failed" in said_by(dask.sweep(), 0)
-    assert as_alone(odd, tmp_path, (0, 1))
+    assert as_alone(odd, tmp_path)
 
 
 @pytest.mark.slow
@@ -133,7 +133,7 @@ def test_ctrl_c_stops_the_runs_on_the_workers_and_the_same_cluster_continues_the
     assert "stopping all runs; the same command continues them" in said_by(sweep, 130)
     assert re.search(r"stopped after 1\d movements", (tmp_path / "random/seed-000.log").read_text())
     assert "2 runs ended well, 0 failed" in said_by(dask.sweep(), 0)
-    assert as_alone(odd, tmp_path, (0, 1))
+    assert as_alone(odd, tmp_path)
 
 
 SLURM = [name for name in ("slurmctld", "slurmd", "munged", "sbatch") if shutil.which(name) is None]
@@ -193,4 +193,4 @@ def test_the_job_of_the_page_goes_on_after_scancel_and_after_its_time_limit(slur
         assert "stopping all runs; the same command continues them" in said
         assert any(movements_on_disk(tmp_path / f"random/seed-00{seed}") in range(10, 40) for seed in (0, 1)), said
     assert slurm("study.sh", lambda submitted: None) == 0, (tmp_path / "study.txt").read_text()
-    assert as_alone(odd, tmp_path, (0, 1))
+    assert as_alone(odd, tmp_path)

@@ -13,6 +13,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from arms import write
 from boards import curves_of
 from runs import LIVE, start
 from sgimd_torch.environments.planar_arm import PlanarArm
@@ -20,7 +21,7 @@ from sgimd_torch.environments.sketch import traced
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.options.build import build
 from sgimd_torch.options.command_line import main, parse
-from sgimd_torch.record.saving import save_life
+from sgimd_torch.record.replay import save_life
 from sgimd_torch.runs.load import load_learner
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.run import RunLoop
@@ -67,11 +68,6 @@ def failing():
 def slipping():
     return task(Slipping(3))
 """
-MODEL = """<mujoco><default><joint damping="1"/></default><option integrator="implicitfast"/>
-  <worldbody><body><joint name="shoulder" axis="0 0 1" range="-120 120"/><geom type="capsule" fromto="0 0 0 .3 0 0"
-    size=".02"/><body pos=".3 0 0"><joint name="elbow" axis="0 0 1" range="-90 90"/><geom type="capsule"
-    fromto="0 0 0 .3 0 0" size=".02" contype="0"/><site name="tip" pos=".3 0 0"/></body></body></worldbody>
-  <actuator><position joint="shoulder" kp="60" kv="6"/><position joint="elbow" kp="60" kv="6"/></actuator></mujoco>"""
 ARM = "--environment planar-arm-7 --benchmark {files}/goals.npz"
 FROM_FILE = "--environment mujoco --environment.model {files}/arm.xml --environment.outcome site:tip:xy"
 FROM_FILE += " --environment.low -1,-1 --environment.high 1,1 --benchmark {files}/model.npz"
@@ -117,7 +113,7 @@ def files(tmp_path_factory):
     """The files that the runs need, and the module of their robots."""
     folder = tmp_path_factory.mktemp("files")
     (folder / "opened.py").write_text(ROBOTS)
-    (folder / "arm.xml").write_text(MODEL)
+    write(folder / "arm.xml")
     for name, robot in (("goals", "PlanarArm"), ("model", "MujocoRobot")):
         save_benchmark(folder / f"{name}.npz", Benchmark(robot, GOALS + 0.1, 0.1))
     thetas, arm = stream(0, "past").random((200, 7)), PlanarArm(7)
@@ -188,7 +184,7 @@ def test_a_run_of_relative_paths_and_own_code_is_opened_from_another_folder(tmp_
         "from pathlib import Path\nfrom sgimd_torch.environments.mujoco_robot import MujocoRobot\n"
         "def make(*, file: Path = Path(), **more):\n    return MujocoRobot(file, outcome='site:tip:xy')\n"
     )
-    (tmp_path / "one/arm.xml").write_text(MODEL)
+    write(tmp_path / "one/arm.xml")
     save_benchmark(tmp_path / "one/model.npz", Benchmark("MujocoRobot", GOALS + 0.1, 0.1))
     of_file = "--environment mujoco --environment.model {}arm.xml --environment.outcome site:tip:xy"
     common = "--algorithm random --movements 20 --repeats 0 --out {} --benchmark {}model.npz"
@@ -206,7 +202,7 @@ def test_a_run_of_relative_paths_and_own_code_is_opened_from_another_folder(tmp_
     again = f"{of_file.format('../one/')} {common.format('../one/runs', '../one/')} --resume"
     assert command(main, [*again.split(), "--movements", "25"]) == 0
     assert read_run(tmp_path / "one/runs/random/seed-000").summary["movements"] == 25
-    (tmp_path / "other/arm.xml").write_text(MODEL)
+    write(tmp_path / "other/arm.xml")
     again = f"{of_file.format('')} {common.format('../one/runs', '../one/')} --resume"
     assert command(main, again.split()) == 2  # another file, though of the same name
     assert "environment.model was ../one/arm.xml, now arm.xml" in capsys.readouterr().err

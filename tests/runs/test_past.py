@@ -10,7 +10,7 @@ from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.options.command_line import main, parse
 from sgimd_torch.record import RunError
-from sgimd_torch.record.saving import save_life
+from sgimd_torch.record.replay import save_life
 from sgimd_torch.runs.directory import RUN_FILE
 from sgimd_torch.runs.load import load_learner
 from sgimd_torch.runs.read import finished, read_run

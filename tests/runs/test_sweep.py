@@ -176,7 +176,7 @@ def test_a_run_that_is_killed_is_named_and_goes_on_next_time(odd, begun, tmp_pat
     assert foreign.read_text() == "not a run"
     shutil.rmtree(foreign.parent)
     said_by(begun(SWEEP, *options), 0)
-    assert as_alone(odd, tmp_path, (0, 1))
+    assert as_alone(odd, tmp_path)
 
 
 @pytest.mark.parametrize(("signum", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
@@ -192,7 +192,7 @@ def test_stopped_it_stops_its_runs_and_goes_on_as_if_nothing_had_happened(
     assert movements_on_disk(tmp_path / "random/seed-000") == 20
     assert not (tmp_path / "random/seed-001").exists()
     said_by(begun(SWEEP, *options), 0)
-    assert as_alone(odd, tmp_path, (0, 1))
+    assert as_alone(odd, tmp_path)
 
 
 def test_no_library_for_figures_or_learning_is_loaded_to_watch_processes(tmp_path):
