@@ -35,7 +35,7 @@ HOW_TO = tuple(
     f"docs/{name}.md"
     for name in ("own-robot", "reading-runs", "own-demonstrations", "teaching-by-hand", "own-teacher", "asking")
 )
-SLOW = ("docs/tutorial.md", "docs/how-to/forward-model.md", "docs/how-to/own-network.md")  # the rod's physics; torch
+SLOW = ("docs/tutorial.md", *(f"docs/how-to/{name}.md" for name in ("ablations", "forward-model", "mujoco", "own-network")))
 PAGES = [
     *ALONE,
     "CHANGELOG.md",
@@ -123,6 +123,7 @@ def test_a_block_works_on_its_own(block, folder):
     assert not list(folder.iterdir()), "an example leaves files behind"
 
 
+@pytest.mark.slow
 def test_how_to_pages_work_one_after_the_other(folder):
     for page in HOW_TO:
         work_through(page)

@@ -26,6 +26,7 @@ def package(tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.mark.slow
 def test_each_file_gets_a_row_once_and_one_that_is_right_is_learnt(package, monkeypatch):
     call = [str(package), "--results", "results"]
     assert main(call) == 0
