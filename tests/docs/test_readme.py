@@ -35,7 +35,10 @@ HOW_TO = tuple(
     f"docs/{name}.md"
     for name in ("own-robot", "reading-runs", "own-demonstrations", "teaching-by-hand", "own-teacher", "asking")
 )
-SLOW = ("docs/tutorial.md", *(f"docs/how-to/{name}.md" for name in ("ablations", "forward-model", "mujoco", "own-network")))
+SLOW = (  # many runs, the rod's physics, or torch
+    "docs/tutorial.md",
+    *(f"docs/how-to/{name}.md" for name in ("ablations", "forward-model", "mujoco", "own-network")),
+)
 PAGES = [
     *ALONE,
     "CHANGELOG.md",
