@@ -48,6 +48,9 @@ class Failing(PlanarArm):
             raise RuntimeError("it fell")
         return super().execute(context, theta, rng)
 
+    def trace(self, context, theta, rng):
+        return super().trace(context, theta, rng)
+
 class Slipping(PlanarArm):
     made = 0
     def execute(self, context, theta, rng):
