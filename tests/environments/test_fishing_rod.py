@@ -225,6 +225,8 @@ def test_nothing_diverges_and_everything_lands_in_reach_even_on_the_corners_of_t
     [
         (lambda rod: FishingRod(noise=-0.1), "noise must be finite and >= 0, got -0.1"),
         (lambda rod: FishingRod(max_wind=np.inf), "max_wind must be finite"),
+        (lambda rod: FishingRod(max_wind=-1.0), "max_wind must be finite"),
+        (lambda rod: FishingRod(threads=1.5), "threads must be a whole number from 1"),
         (lambda rod: FishingRod(threads=0), "threads must be a whole number from 1"),
         (lambda rod: FishingRod(outcomes=Box.cube(-1, 1, 3)), r"rest, .* must have shape \(..., 3\).* is T in m"),
         (lambda rod: FishingRod(outcomes=Box.cube(5, 6, 2)), "rest, .* must lie in its box"),

@@ -170,6 +170,7 @@ def test_an_arm_that_a_mocap_body_pulls_is_moved_by_its_joints_if_asked_for(here
     [
         ({"outcome": "site:root"}, "no joint moves it, is it on the base? A place of the arm is site:r:tip:x"),
         ({"outcome": "site:r:tup:x"}, "the model has no site 'r:tup'; did you mean r:tip:x?"),
+        ({"joints": ("r:1", "r:1")}, "joints names 'r:1' 2 times"),
         ({"model": "pulled.xml", "outcome": "site:hand:x"}, "a mocap body holds cart; --environment.servos made moves"),
         ({"model": "arm.sdf"}, "arm.sdf is an SDF file; MuJoCo reads MJCF and URDF"),
         ({"servos": "mad"}, "unknown servos 'mad'; did you mean made?"),

@@ -54,7 +54,10 @@ NONE = np.zeros(0)
 @pytest.fixture(scope="module")
 def files(tmp_path_factory):
     folder = tmp_path_factory.mktemp("models")
-    absurd = {"still.xml": ARM.replace("<worldbody>", '<option timestep="0"/><worldbody>')}
+    absurd = {
+        f"{name}.xml": ARM.replace("<worldbody>", f'<option timestep="{step}"/><worldbody>')
+        for name, step in (("still", 0), ("fine", 1e-9))
+    }
     absurd["slow.urdf"] = URDF.replace('velocity="5"', 'velocity="1e-6"')
     for name, text in {"arm.xml": ARM, "arm.urdf": URDF, "tooth.obj": TOOTH, **absurd}.items():
         (folder / name).write_text(text)
@@ -274,7 +277,13 @@ def test_a_robot_made_by_a_function_of_the_user_has_no_options_to_keep(here):
         ({"durations": (0.5, np.inf)}, "a movement of inf s and settle 0.5 s take inf steps"),
         ({"settle": 1e9}, "a movement of 1.5 s and settle 1e+09 s take 2e+11 steps"),
         ({"model": "still.xml"}, "take inf steps at the model's timestep 0, more than 100000"),
-        ({"model": "slow.urdf", "outcome": "body:tool:xz"}, "more than 100000; durations, settle and timestep are in"),
+        ({"context": "joint:hinge:1_0:20"}, "1_0 and 20 must be two numbers, the lower one first"),
+        ({"n_knots": 10**9}, "n_knots must be a whole number from 2 to 100, got 1000000000"),
+        ({"model": "fine.xml"}, "take 2e+09 steps at the model's timestep 1e-09, more than 100000; durations, settle"),
+        (
+            {"model": "slow.urdf", "outcome": "body:tool:xz"},
+            "more than 100000; durations, settle and timestep are in s",
+        ),
         ({"low": (0.0, 0.0, 0.0), "high": (1.0, 1.0)}, "low must have shape (..., 2)"),
     ],
 )

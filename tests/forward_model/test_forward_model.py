@@ -259,3 +259,12 @@ def test_other_scales_leave_what_is_predicted_as_it_is():
     model._scale(0.1 + 3 * more.thetas, 7 - 2 * more.outcomes)
     after = model.predict(NO_CONTEXT, more.thetas)
     np.testing.assert_allclose(after.mean, before.mean, atol=1e-5)
+
+
+def test_the_region_is_an_ellipse_along_the_axes_not_a_box_or_circle():
+    mean, spread = np.zeros((5, 2)), np.tile([0.1, 1.0], (5, 1))
+    edge = np.sqrt(-2 * np.log(1 - 0.8))  # of the 80 % region, in standard deviations
+    outcomes = np.array([[0.99 * edge, 0], [1.01 * edge, 0], [0, 9.9 * edge], [0, 10.1 * edge], [0.8 * edge, 8 * edge]])
+    inside = [coverage(row[None], mean[:1], spread[:1], 0.8) for row in outcomes * 0.1]
+    assert inside == [1, 0, 1, 0, 0]
+    assert coverage(outcomes * 0.1, mean, spread, 0.8) == pytest.approx(2 / 5)

@@ -342,6 +342,7 @@ def test_the_curves_are_those_of_the_newest_refresh(listen):
 
 def test_a_run_through_the_model_makes_one_of_the_size_of_its_robot_with_its_options():
     options = {"members": 2, "rate": 1.5, "noise_heads": False, "trust": 0.2, "widths": (8,), "lr": 0.1, "batch": 5}
+    options |= {"activation": "tanh"}
     parts = {"search": "gradient", "inverse": "model", "environment": "fishing-rod"}
     parts |= {f"inverse.{name}": value for name, value in options.items()}
     learner = build(Config(algorithm="sagg-riac", parts=parts)).learner

@@ -89,10 +89,22 @@ def test_a_run_that_has_just_begun_is_read_as_empty(run):
 
 
 def test_what_is_no_run_is_refused(tmp_path, run):
-    """A folder without a run is in the table of wrong commands."""
-    save_life(random_exploration(PlanarArm(7), 0), tmp_path / RUN_FILE)
-    with pytest.raises(RunError, match="is a life that save_life wrote"):
-        read_run(tmp_path)
+    (tmp_path / "old").mkdir()
+    save_life(random_exploration(PlanarArm(7), 0), tmp_path / "old" / RUN_FILE)
+    (tmp_path / "csv").mkdir()
+    for path, message in (
+        (tmp_path, "holds no run;"),
+        (tmp_path / "nowhere", "holds no run;"),
+        (tmp_path / "csv", "holds no run;"),
+        (tmp_path / "old", r"is a life that save_life wrote"),
+    ):
+        with pytest.raises(RunError, match=message):
+            read_run(path)
+        assert movements_on_disk(path) == 0
+    with pytest.raises(RunError, match="holds no runs"):
+        find_runs(tmp_path / "csv")
+    with pytest.raises(RunError, match="does not exist"):
+        find_runs(tmp_path / "nowhere")
     write_about(run, settings={**read_run(run).config, "algorithm": "gone"})
     with pytest.raises(RunError, match="do not describe a run of this version"):
         config_of(read_run(run))

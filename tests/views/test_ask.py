@@ -2,6 +2,7 @@
 
 import csv
 import math
+import re
 import sys
 from pathlib import Path
 
@@ -110,3 +111,10 @@ def test_the_joints_over_time_are_those_of_the_primitive(tmp_path, capsys):
     times, joints = FishingRod().primitive.trajectory(load_learner(path).inverse(np.zeros(0), [0.3, 0.4]).theta)
     rows = np.array([[float(x) for x in row.values()] for row in table_of(out)])
     np.testing.assert_array_equal(rows, np.column_stack([times, joints]))
+
+
+def test_a_distance_is_told_with_its_unit(path, capsys):
+    assert command(main, [str(path), "--goal", "1,1"]) == 0  # beyond the reach of 1 m
+    said = capsys.readouterr().out
+    away = re.search(r"; expected_distance (\S+) m; expected_deviation \S+ m\n", said)
+    assert float(away[1]) == pytest.approx(math.sqrt(2) - 1, abs=0.05)

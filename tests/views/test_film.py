@@ -1,5 +1,6 @@
 """Films show what was simulated: where the float flies, when it lands, what the run's own memory infers."""
 
+import itertools
 import os
 import subprocess
 import sys
@@ -18,6 +19,7 @@ from sgimd_torch.environments.sketch import Sketch
 from sgimd_torch.options import command_line
 from sgimd_torch.runs.signals import command
 from sgimd_torch.spaces import Box, stream
+from sgimd_torch.views import check
 from sgimd_torch.views.film import command as film
 from sgimd_torch.views.film.model_camera import viewing
 from sgimd_torch.views.film.reel import PAUSE, RATES, Shot, write_film
@@ -314,7 +316,7 @@ ARM_OF_GREY = """<mujoco><worldbody>{}<body><joint name='turn' axis='0 0 1' rang
 
 def test_an_arm_of_any_brightness_stands_out_from_what_is_behind_it(tmp_path):
     paths, plane, light = [], "<geom type='plane' size='.1 .1 .1'/>", "<light pos='0 0 2'/>"
-    for grey, around in ((0.05, ""), (0.8, ""), (0.05, plane), (0.8, light)):
+    for grey, around in itertools.product((0.05, 0.6, 1.0), ("", plane, light)):
         paths.append(tmp_path / f"{len(paths)}.xml")
         paths[-1].write_text(ARM_OF_GREY.format(around, grey, grey, grey))
     pixels, differences = np.loadtxt(drawn_in_space(CONTRAST, *paths).splitlines()).T
@@ -378,3 +380,9 @@ def test_code_that_somebody_elses_run_names_is_executed_only_with_trust(own, cap
         "names code outside this library, sliders:Slider; read it, then execute it with --trust"
         in capsys.readouterr().err
     )
+
+
+@pytest.mark.parametrize("word", ["sliders:Slider", "fishing-rod"])
+def test_the_check_of_an_environment_looks_at_its_picture(own, word):
+    """Pictures that it refuses are in the table of wrong commands."""
+    assert command(check.main, [word]) == 0

@@ -52,6 +52,11 @@ def test_an_interval_holds_the_truth_about_as_often_as_it_says(rng, monkeypatch)
     assert 0.90 < share < 0.98  # .945 measured on 2000; its standard error here is .011
 
 
+def test_noise_that_both_sides_of_a_pair_share_cancels(rng):
+    noise = dict(enumerate(rng.normal(0, 5, 8)))
+    np.testing.assert_allclose(common_differences({seed: each - 1 for seed, each in noise.items()}, noise), -1)
+
+
 def test_pairs_are_matched_by_seed_not_by_place_and_others_are_left_out():
     ours, theirs = {3: 1.0, 1: 5.0, 7: 0.0}, {2: 0.0, 1: 4.0, 3: 3.0}
     np.testing.assert_allclose(common_differences(ours, theirs), [1, -2])
