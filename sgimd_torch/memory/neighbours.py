@@ -68,9 +68,12 @@ class Neighbours:
         Raises:
             ValueError: ``k`` is below 1.
         """
-        n, (last_query, rows, squared, compared), key = len(self.keys), self._last, query.tobytes()
-        if last_query != key or rows.shape[1] < min(n, max(k, LISTED)) or not 1 <= k <= n <= EXACT_UP_TO:
-            rows, squared = self._search(query[None], max(k, LISTED) if 1 <= k <= n <= EXACT_UP_TO else k)
+        n, key = len(self.keys), query.tobytes()
+        if not 1 <= k <= LISTED <= n <= EXACT_UP_TO:
+            return self.nearest(query[None], k)[0]
+        last_query, rows, squared, compared = self._last
+        if last_query != key:
+            rows, squared = self._search(query[None], LISTED)
         elif compared < n:
             rows, squared = rows.copy(), squared.copy()
             _scan().extend(self.keys.rows, query[None], *_NO_SINGLES, np.array([compared]), _FIRST, rows, squared)
