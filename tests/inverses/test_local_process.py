@@ -5,14 +5,16 @@ import pytest
 from threadpoolctl import threadpool_info
 
 from experiments.toys import Toy, toss, two_elbows
-from sgimd_torch.inverses import kernels
 from sgimd_torch.inverses.gaussian_process import Kernel, choose_kernel, fit_lengths, one_thread
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.inverses.locally_linear import LocallyLinear
 from sgimd_torch.inverses.nearest import NearestNeighbour
+from sgimd_torch.memory.compiled import compiled
 from sgimd_torch.parts import Inverse, Problem
 from sgimd_torch.spaces import Array, stream
 from worlds import NO_CONTEXT, problem, remember
+
+kernels = compiled("sgimd_torch.inverses.kernels")  # an import would leave machine code of its own beside the module
 
 SMOOTH = Kernel(scale=1.0, finer=1.0, share=0.0, noise=1e-6)
 ROUGH = Kernel(scale=0.5, finer=4.0, share=0.3, noise=0.1)
