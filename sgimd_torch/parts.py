@@ -107,13 +107,9 @@ class Part(Built):
 
 
 class Trained(ABC):
-    """Object that parts share and that is trained while the learner moves, such as a forward model.
+    """Object that parts share and that is trained while the learner moves, such as a forward model."""
 
-    Attributes:
-        device: device that trains, for the record; "" if there is no choice.
-    """
-
-    device: str = ""
+    device: str = ""  # device that trains, for the record; "" if there is no choice
 
     @abstractmethod
     def refresh(self, memory: Memory) -> object:
@@ -124,6 +120,7 @@ class Goals(Part):
     """Goal model: chooses goals by the results of earlier goals (section 3.2). `goals.uniform` has argument checks."""
 
     draws_from = "goals"
+    by_competence: ClassVar[bool] = True  # whether `add` uses competence and gain; if not, it may get 0 for both
 
     @abstractmethod
     def sample(self, context: Array) -> Array:

@@ -91,7 +91,7 @@ class GoalBabbling(Strategy):
         self.explore = Explore.of(explore, problem)
         self.goals = Goals.of(goals, problem)
         self.search = Search.of(search, problem)
-        self.judge = self.competence if judge is Competence else Judge.of(judge, problem)
+        self.judge = Judge.of(judge, problem)
         self.budget = check_count("budget", budget, 1)
         self.tolerance, self.global_range, self.give_up = tolerance, global_range, give_up
 
@@ -111,7 +111,7 @@ class GoalBabbling(Strategy):
     def pursue(self, context: Array, goal: Array, strategy: str = "autonomous") -> Attempt:
         """Pursue ``goal`` until it is reached or given up, the budget is spent, or a demonstration interrupts."""
         outcomes: list[Array] = []
-        competence_before = best = self.competence(context, goal)
+        competence_before = best = self.competence_at(context, goal)
         moves = self._explore(context, goal)
         move = next(moves)
         try:
@@ -120,12 +120,17 @@ class GoalBabbling(Strategy):
                 outcomes.append(outcome)
                 if len(outcomes) == self.budget or np.linalg.norm(outcome - goal) <= self.tolerance:
                     return
-                previous, best = best, self.competence(context, goal)
+                previous, best = best, self.competence_at(context, goal)
                 if best <= previous and best < self.give_up:
                     return
                 move = moves.send(outcome)
         finally:  # interruption by a demonstration included
             self.report_competence(context, goal, outcomes, competence_before, strategy)
+
+    def competence_at(self, context: Array, goal: Array) -> float:
+        """Competence at a goal, eq. (2). It is 0, which spares a search of the memory, where nothing depends on it: the
+        goal model does not use it, and a goal gets one movement, so none is given up."""
+        return self.competence(context, goal) if self.goals.by_competence or self.budget > 1 else 0.0
 
     def report_competence(
         self, context: Array, goal: Array, outcomes: list[Array], competence_before: float, strategy: str
@@ -138,7 +143,9 @@ class GoalBabbling(Strategy):
             strategy: name of the strategy that chose the goal: "autonomous", "social" or another name.
         """
         if outcomes:
-            judged, after = self.judge(context, goal, np.stack(outcomes)), self.competence(context, goal)
+            judged = after = self.competence_at(context, goal)
+            if type(self.judge) is not Competence:
+                judged = self.judge(context, goal, np.stack(outcomes))
             # The new nearest exemplar in (context, outcome) may be farther in outcome alone; this is no loss.
             gain = max(0.0, after - competence_before)
             if gain == 0 and judged != after:  # the judge rates the attempt alone, which may be worse than the memory
@@ -247,7 +254,7 @@ class Imitate(Mimic):
             yield from super().attempt(context, theta_d, demonstration)
             return
         outcomes: list[Array] = []
-        competence_before = self.babbling.competence(context, goal)
+        competence_before = self.babbling.competence_at(context, goal)
         try:
             yield from self.repeat(theta_d, goal, outcomes)
         finally:  # interruption by the next demonstration included

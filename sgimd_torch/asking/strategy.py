@@ -73,7 +73,7 @@ class StrategicBabbling(Strategy):
             return
         teacher, social, _, takes = self.asking[strategy]
         lesson = yield Request(teacher, goal, strategy)
-        competence_before = self.babbling.competence(context, goal)
+        competence_before = self.babbling.competence_at(context, goal)
         if lesson is None:  # a request without a reply has the lowest competence and gain, so it is repeated rarely
             self.goals.add(context, goal, competence=-1.0, strategy=strategy, gain=-1.0)
             yield from self.babbling.pursue(context, goal)
@@ -82,7 +82,7 @@ class StrategicBabbling(Strategy):
             yield None  # a rest
         outcome_d = lesson.demonstration.outcome
         executed: list[tuple[Array, Array]] = []  # thetas and outcomes
-        competence_before_d = self.babbling.competence(context, outcome_d)
+        competence_before_d = self.babbling.competence_at(context, outcome_d)
         try:
             yield from recording_outcomes(social.attempt(context, *lesson), executed)
         finally:  # also if another demonstration interrupts the imitation

@@ -53,6 +53,8 @@ class WithinReach(UniformGoals):
         ValueError: ``candidates`` is no count.
     """
 
+    by_competence = False
+
     def __init__(self, problem: Problem, *, candidates: int = 2) -> None:
         super().__init__(problem)
         self.candidates = check_count("candidates", candidates, 1)

@@ -9,7 +9,17 @@ from typing import Final
 
 import numpy as np
 
-from sgimd_torch.memory.jit import LISTS, NUMBERS, TABLE, as_columns, compiled_for, jit_helper, solve, squared_distance
+from sgimd_torch.memory.jit import (
+    LISTS,
+    NUMBERS,
+    TABLE,
+    WRITABLE_NUMBERS,
+    as_columns,
+    compiled_for,
+    jit_helper,
+    solve,
+    squared_distance,
+)
 from sgimd_torch.spaces import Array
 
 ALPHA: Final = 0.5  # weight of a neighbourhood's spread in eq. (8); its distance to the goal has weight 1
@@ -30,15 +40,16 @@ def spread(outcomes: Array) -> float:
     return np.sqrt(total / (n - 1))
 
 
-@compiled_for(LISTS, TABLE, TABLE, NUMBERS, TABLE)
-def locally_linear(alike: np.ndarray, thetas: Array, outcomes: Array, goal: Array, box: Array) -> tuple[int, Array]:
-    """The answer of `LocallyLinear`: the number of the best neighbourhood, and theta.
+@compiled_for(LISTS, TABLE, TABLE, NUMBERS, TABLE, WRITABLE_NUMBERS)
+def locally_linear(alike: np.ndarray, thetas: Array, outcomes: Array, goal: Array, box: Array, answer: Array) -> int:
+    """The answer of `LocallyLinear`; returns the number of the best neighbourhood.
 
     Args:
         alike: ``(h, k)`` neighbourhoods K_h of eq. (8) as rows, theta_h first; -1 where there are fewer than k.
         thetas, outcomes: ``(n, theta_dim)`` and ``(n, outcome_dim)``, all movements in memory.
         goal: ``(outcome_dim,)``.
         box: ``(2, theta_dim)``, corners of the box around all thetas.
+        answer: ``(theta_dim,)``, receives theta; numba takes ten times as long to return an array.
     """
     sizes, spreads, n_known = np.zeros(len(alike), np.int64), np.empty(len(alike)), 0
     for h in range(len(alike)):
@@ -72,4 +83,5 @@ def locally_linear(alike: np.ndarray, thetas: Array, outcomes: Array, goal: Arra
         solve(covariance, RIDGE * variance, pull_to_goal)
         step = theta_deviations @ (weights * (pull_to_goal @ outcome_deviations))
         theta = np.minimum(np.maximum(theta + step, box[0]), box[1])
-    return best, theta
+    answer[:] = theta
+    return best

@@ -53,5 +53,6 @@ class LocallyLinear(Inverse):
         memory = self._memory
         alike = memory.neighbourhoods(near, _ALIKE, self._radius)
         kernels = compiled("sgimd_torch.inverses.linear_kernel")
-        best, theta = kernels.locally_linear(alike, memory.thetas, memory.outcomes, goal, memory.theta_range)
+        theta = np.empty(memory.theta_dim)
+        best = kernels.locally_linear(alike, memory.thetas, memory.outcomes, goal, memory.theta_range, theta)
         return theta, alike[best][alike[best] >= 0]

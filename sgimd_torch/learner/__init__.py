@@ -413,9 +413,8 @@ class Learner:
     def _remember(self, context: Array, theta: Array, outcome: Array) -> None:
         if self.watcher is not None:
             self.watcher.expect(context, theta, outcome)
-        self.memory.add(context, theta, outcome)
-        if self.problem.memory is not self.memory:
-            self.problem.memory.add(context, theta, outcome)
+        for memory in dict.fromkeys((self.memory, self.problem.memory)):
+            memory.extend(context[None], theta[None], outcome[None])
 
     def _restart_if_changed(self) -> None:
         """Begin again if the robot has changed: attempts end, and all parts are built anew."""

@@ -10,6 +10,7 @@ not as listed is removed, so it is made again.
 
 from __future__ import annotations
 
+import fcntl
 import importlib
 import os
 import subprocess
@@ -92,9 +93,14 @@ def _remove_damaged(folder: Path) -> None:
 
 
 def _list_files(folder: Path) -> None:
-    partial = folder / f"{os.getpid()}.part"
-    partial.write_text("\n".join(line for _, line in _files(folder)), encoding="utf-8")
-    partial.replace(folder / _LIST)
+    held = os.open(folder, os.O_RDONLY)
+    fcntl.flock(held, fcntl.LOCK_EX)  # else the list written last could be older than some of the files
+    try:
+        partial = folder / f"{os.getpid()}.part"
+        partial.write_text("\n".join(line for _, line in _files(folder)), encoding="utf-8")
+        partial.replace(folder / _LIST)
+    finally:
+        os.close(held)
 
 
 def _files(folder: Path) -> Iterator[tuple[Path, str]]:

@@ -242,7 +242,7 @@ def test_learning_loads_numba_only_when_the_memory_is_searched():
         "import sgimd_torch as s; arm = s.PlanarArm(3); learner = s.{}(arm, 0); [*s.run(learner, arm, 0, movements=3)]"
     )
     assert "numba" not in loaded_by(program.format("random_exploration"))
-    assert "numba" in loaded_by(program.format("practice"))
+    assert "numba" in loaded_by(program.format("sagg_riac"))
 
 
 @pytest.mark.parametrize("words", [["--help"], ["run", "--help"], ["--version"]])
