@@ -27,13 +27,11 @@ WHOLE: Final[Variant] = {"evaluate_at": (250, 500, 1000, 2000, 5000)}
 END: Final[Variant] = {"evaluate_at": (5000,)}
 SHORT: Final[Variant] = {"movements": 2000, "evaluate_at": (250, 500, 1000, 2000)}
 FLOOR: Final[Variant] = {"floor_at": (5000,), "repeats": 3}  # measures the noise floor, too
-# The letter of the paper with two bounds of ours, which the rows in results/ were made with: a probability of global
-# exploration between .05 and .95, and a first imitation that is exact.
-BOUNDS: Final[Variant] = {"global_range": (0.05, 0.95)}
-SGIM_D_LETTER: Final[Variant] = {"algorithm": "sgim-d-letter", **BOUNDS, "social.exact_first": True}
-SAGG_RIAC_LETTER: Final[Variant] = {"algorithm": "sagg-riac-letter", **BOUNDS}
+SGIM_D_LETTER: Final[Variant] = {"algorithm": "sgim-d-letter"}
+SAGG_RIAC_LETTER: Final[Variant] = {"algorithm": "sagg-riac-letter"}
 # Steps from there to our defaults, one change at a time: name, options.
 STEPS: Final[tuple[tuple[str, Variant], ...]] = (
+    ("limits", {"global_range": (0.05, 0.95), "social.exact_first": True}),
     ("inverse", {"inverse": "linear"}),
     ("simplex", {"search.complete": False, "search.xatol": 0.1, "search.fatol": 0.05}),
     ("budget", {"budget": 15}),
@@ -104,7 +102,7 @@ def _on_tasks(learners: dict[str, Variant], tasks: Iterable[str]) -> dict[str, V
 def _ladder(ending: str, where: Variant) -> dict[str, Variant]:
     """The steps between the letter of the paper, ``sgim-d-letter``, and our defaults, ``sgim-d``."""
     ladder, line = {}, {**SGIM_D_LETTER, **where, **END}
-    for number, (step, changed) in enumerate(STEPS, 1):
+    for number, (step, changed) in enumerate(STEPS):
         ladder[f"ladder-{number}-{step}{ending}"] = line = {**line, **changed}
     return ladder
 

@@ -190,7 +190,6 @@ LETTER = (  # spelled out
     "inverse=paper goals.progress=absolute goals.g_max=50 goals.max_aspect=1e9 search.noise=0 search.complete=true "
     "search.xatol=1e-4 search.fatol=1e-4 budget=60 give_up=-1 global_range=0,1"
 )
-BOUNDS = {"global_range": (0.05, 0.95), "social.exact_first": True}
 
 
 def arm_life(algorithm, learner_of=None, **options):
@@ -212,19 +211,16 @@ def test_the_letter_is_one_word_for_twelve_options():
     assert np.array_equal(life, arm_life("sgim-d", **spelled, **varied))
     in_python = arm_life("sgim-d-letter", lambda arm: sgim_d_letter(arm, 3, correspondence=arm.correspondence))
     assert np.array_equal(life, in_python)
-    bounded = arm_life("sgim-d-letter", **BOUNDS)
-    assert np.array_equal(bounded, arm_life("sgim-d", **{**spelled, **BOUNDS}))
-    assert not np.array_equal(bounded, life)
 
 
-def test_rows_of_the_letter_are_the_algorithm_with_two_bounds(go, tmp_path):
-    (config,) = jobs_of("letter", ["sgim-d-letter"], [3], tmp_path)
-    assert (config.algorithm, dict(config.parts)) == ("sgim-d-letter", BOUNDS)
-    options = ("--algorithm", "sgim-d-letter", "--global-range", "0.05,0.95", "--social.exact-first", "true")
+def test_rows_of_the_letter_are_made_by_one_word(go, tmp_path):
+    letters = ["sagg-riac-letter", "sgim-d-letter"]
+    assert [(job.algorithm, dict(job.parts)) for job in jobs_of("letter", letters, [3], tmp_path)] == [
+        (letter, {}) for letter in letters
+    ]
     arm = ("--environment", "planar-arm-7", "--teacher.every", 20, "--movements", 60, "--evaluate-at", "[]")
-    assert go(tmp_path, *options, *arm, "--benchmark", "null") == 0
-    lived = read_run(tmp_path / "sgim-d-letter" / "seed-003").thetas
-    assert np.array_equal(lived, arm_life("sgim-d-letter", **BOUNDS))
+    assert go(tmp_path, "--algorithm", "sgim-d-letter", *arm, "--benchmark", "null") == 0
+    assert np.array_equal(read_run(tmp_path / "sgim-d-letter" / "seed-003").thetas, arm_life("sgim-d-letter"))
 
 
 def test_a_corner_is_twenty_neighbours_and_many_are_the_first(tmp_path):
