@@ -186,13 +186,9 @@ class Page:
         small = [name for name in EXPERIMENTS["ladder"] if not name.endswith("-large")]
         both = [[f"{name}{end}" for name in ("sgim-d-letter", *small, "sgim-d")] for end in ("", "-large")]
         for name, large in zip(*both, strict=True):
-            own = (
-                " by paper"
-                if name.endswith(("letter", "limits"))
-                else " by linear"
-                if name.startswith("ladder")
-                else ""
-            )
+            own = " by linear" if name.startswith("ladder") else ""
+            if name.endswith(("letter", "limits")):
+                own = " by paper"
             rows.append([f"`{name}`", *(self.error(variant) for variant in (f"{name}{own}", name, large))])
         return markdown(("step", "T, by its own answer", "T, by `process`", "large T, by `process`"), rows)
 

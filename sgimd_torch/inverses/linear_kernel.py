@@ -49,7 +49,7 @@ def locally_linear(alike: np.ndarray, thetas: Array, outcomes: Array, goal: Arra
         thetas, outcomes: ``(n, theta_dim)`` and ``(n, outcome_dim)``, all movements in memory.
         goal: ``(outcome_dim,)``.
         box: ``(2, theta_dim)``, corners of the box around all thetas.
-        answer: ``(theta_dim,)``, receives theta; numba takes ten times as long to return an array.
+        answer: ``(theta_dim,)``, receives theta, as numba is slow to return an array.
     """
     sizes, spreads, n_known = np.zeros(len(alike), np.int64), np.empty(len(alike)), 0
     for h in range(len(alike)):

@@ -298,6 +298,15 @@ def test_the_gain_of_an_attempt_is_its_goals_competence_afterwards_less_that_bef
     )  # judged by the attempt alone, as this judge does
 
 
+@pytest.mark.parametrize(("uses", "gain"), [(True, 0.4), (False, 0.0)])
+def test_the_gain_of_a_single_movement_is_measured_if_the_goal_model_uses_it(uses, gain, monkeypatch) -> None:
+    monkeypatch.setattr(Diary, "by_competence", uses)
+    memory = having_made(0.2)
+    pursuit = babbling(memory, goal=METRE, budget=1)
+    assert make_way(pursuit.attempt(NO_CONTEXT), memory, 0.6) == 1
+    assert pursuit.goals.gains == pytest.approx([gain])
+
+
 def test_a_gain_is_never_negative_where_contexts_vary() -> None:
     # At .3 of context from here the goal was met; here, .2 of the way is missing, which is nearer than .3.
     here, there = np.array([0.0]), np.array([0.3])
