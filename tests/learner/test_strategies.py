@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from sgimd_torch.competence import AttemptCompetence, performance
+from sgimd_torch.competence import AttemptCompetence, Competence, performance
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.inverses.nearest import NearestNeighbour
@@ -302,7 +302,7 @@ def test_the_gain_of_an_attempt_is_its_goals_competence_afterwards_less_that_bef
 def test_the_gain_of_a_single_movement_is_measured_if_the_goal_model_uses_it(uses, gain, monkeypatch) -> None:
     monkeypatch.setattr(Diary, "by_competence", uses)
     memory = having_made(0.2)
-    pursuit = babbling(memory, goal=METRE, budget=1)
+    pursuit = babbling(memory, goal=METRE, budget=1, judge=Competence)
     assert make_way(pursuit.attempt(NO_CONTEXT), memory, 0.6) == 1
     assert pursuit.goals.gains == pytest.approx([gain])
 
