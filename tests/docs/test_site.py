@@ -142,4 +142,4 @@ def test_the_search_finds_a_page_when_the_site_is_served(site):
         tab.wait_for_load_state("networkidle")
         tab.keyboard.press("Control+k")
         tab.keyboard.type("noise floor", delay=20)
-        tab.locator("a", has_text="how to measure the part of the error").first.wait_for(timeout=60000)
+        tab.locator("a", has_text="How large is the part of the error").first.wait_for(timeout=60000)
