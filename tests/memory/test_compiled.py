@@ -51,7 +51,10 @@ def started(package: Path, program: str = PROGRAM, **variables: str) -> subproce
 def test_two_processes_compile_at_once_for_a_third_though_the_package_cannot_be_written_to(package, tmp_path):
     variables = {"XDG_CACHE_HOME": str(tmp_path / "cache"), "HOME": str(tmp_path / "home")}
     both = [started(package, **variables) for _ in range(2)]
-    assert [process.communicate() for process in both] == [("3 4\n", SAID)] * 2
+    outputs, said = zip(*(process.communicate() for process in both), strict=True)
+    assert outputs == ("3 4\n", "3 4\n")
+    assert SAID in said
+    assert {*said} <= {SAID, ""}  # on a busy machine one may begin when the other has ended
     assert started(package, **variables).communicate() == ("3 4\n", "")
 
 
