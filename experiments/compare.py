@@ -53,11 +53,11 @@ COST: Final = {
     "large": 9.0,
     "teachers": 6.0,
     "practice": 6.0,
-    "robots": 3.3,
+    "robots": 10.0,
     "rivals": 5.0,
     "model": 13.0,
     "changes": 4.0,
-    "suite": 2.5,
+    "suite": 6.5,
     "ladder": 8.0,
     "asking": 9.0,
 }
