@@ -53,7 +53,7 @@ class WithinReach(UniformGoals):
         ValueError: ``candidates`` is no count.
     """
 
-    by_competence = False
+    by_competence = False  # `add` uses the error of the last movement; a subclass that uses competence says True
 
     def __init__(self, problem: Problem, *, candidates: int = 2) -> None:
         super().__init__(problem)

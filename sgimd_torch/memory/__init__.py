@@ -130,7 +130,7 @@ class Memory:
         return memory
 
     def extend(self, contexts: Array, thetas: Array, outcomes: Array) -> None:
-        """Remember exemplars ``(n, dim)`` that another memory has checked."""
+        """Remember exemplars ``(n, dim)`` that another memory, or the learner, has checked."""
         for table, rows in ((self._contexts, contexts), (self._thetas, thetas), (self._outcomes, outcomes)):
             table.append(rows)
         if len(thetas):
