@@ -114,6 +114,7 @@ class LeRobotArm:
         self._twin = twin = MujocoRobot(model, outcome=outcome, outcome_noise=outcome_noise, settle=settle, **of_model)
         self.contexts, self.policies, self.outcomes, self.rest = twin.contexts, twin.policies, twin.outcomes, twin.rest
         self.outcome_noise, self.joints, self.primitive = outcome_noise, twin.joints, twin.primitive
+        self.within_reach = twin.within_reach
         self.correspondence, self.files, self.remarks = twin.correspondence, twin.files, twin.remarks
         self.found_options = {name: twin.found_options[name] for name in self.FOUND_OPTIONS}
         ranges, unit_of = twin.primitive.ranges, units_of(self.joints, units_from(units))

@@ -22,6 +22,7 @@ from sgimd_torch.environments.controllers import Controller
 from sgimd_torch.environments.models.file import file_of, load_model
 from sgimd_torch.environments.models.look import NEARLY, SUNK, listed, missed, parts, reached
 from sgimd_torch.environments.models.places import (
+    acted,
     body_of,
     check_moved,
     commands_box,
@@ -29,6 +30,7 @@ from sgimd_torch.environments.models.places import (
     hand_of,
     holding,
     joint_of,
+    joints_above,
     moved_by,
     outcome_places,
     path_to,
@@ -51,6 +53,7 @@ SELDOM: Final = 0.2  # share of random movements that move the measured place; a
 FINEST: Final = 1e-4  # share of T's longest side that a small object at rest may tremble by
 TREMBLE: Final = 1e-6  # m or rad; an object at rest trembles less, which must not look like an effect of a movement
 MOST_STEPS: Final = 100_000  # largest number of timesteps of a movement
+POSTURES: Final = 5000  # number of random postures that show what is within reach
 _BLOCK: Final = 32  # number of movements simulated in parallel
 _STATE: Final = mujoco.mjtState.mjSTATE_FULLPHYSICS
 _FRAMES: Final = 25.0  # drawings of a movement per second
@@ -208,8 +211,24 @@ class MujocoRobot:
     @property
     def carries_outcome(self) -> bool:
         """Whether the joints of the robot alone say where the measured places are."""
-        arm = self.joints, self.bodies
-        return all((p.name in arm[0]) if p.kind == "joint" else body_of(self.model, p) in arm[1] for p in self._places)
+        for place in self._places:
+            body = body_of(self.model, place)
+            alone = place.name in self.joints if place.kind == "joint" else body in self.bodies
+            if not alone or (place.axes and {*joints_above(self.model, body)} - acted(self.model)):
+                return False
+        return bool(self.joints)
+
+    def within_reach(self) -> Array:
+        """``(n, outcome_dim)``, measured places in random postures without contacts; see `FromFiles`."""
+        ranges, outcomes, rng = self.primitive.ranges, list[Array](), stream(0, "postures")
+        start = self._read(self._home) if self._displacement else np.zeros(self._dim)
+        for _ in range(POSTURES if ranges is not None and self.carries_outcome else 0):
+            assert ranges is not None
+            outcomes.append(self.outcome_at(ranges.sample(rng)) - start)
+            mujoco.mj_collision(self.model, data := self._data[0])
+            if touching(self.model, data, self.bodies, alone=False):
+                outcomes.pop()
+        return np.reshape(outcomes, (-1, self._dim))
 
     def commanded(self, theta: Array) -> Array:
         """``(n_steps, n_commands)``, commands of a movement without noise, one for each timestep of the model."""

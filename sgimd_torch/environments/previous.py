@@ -18,7 +18,8 @@ from numpy.typing import ArrayLike
 from sgimd_torch.environments.protocol import Environment, check_movement
 from sgimd_torch.spaces import Array, Box
 
-_KEPT: Final = ("primitive", "files", "remarks", "found_options")  # optional members that stay as they are
+# Optional members that stay as they are.
+_KEPT: Final = ("primitive", "files", "remarks", "found_options", "within_reach")
 
 
 class WithPrevious:

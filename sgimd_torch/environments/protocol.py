@@ -143,6 +143,10 @@ class FromFiles(Protocol):
     remarks: Sequence[str]
     found_options: Mapping[str, Any]
 
+    def within_reach(self) -> Array:
+        """``(n, outcome_dim)``, outcomes all over what is within reach, always the same; none if that is not known."""
+        ...
+
 
 def primitive_of(environment: Environment) -> Primitive:
     """The primitive of an environment; a `Primitive` with the defaults if the environment has none."""

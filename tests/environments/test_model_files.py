@@ -9,6 +9,7 @@ import pytest
 
 from sgimd_torch import MujocoRobot, check_environment, stream
 from sgimd_torch.environments.models.posture import NEAR, nearest_posture
+from sgimd_torch.runs.tasks import Task, benchmark_of, goals_all_over
 from urdf import URDF
 
 # Two links of .3 m under gravity, with motors; the second one begins outside its range, and carries a pole that swings.
@@ -54,6 +55,7 @@ GATE = """<mujoco><option gravity="0 0 0"/><worldbody>
   <actuator><motor joint="turn"/></actuator></mujoco>"""
 KEY = '<keyframe><key name="Home" qpos=".3 .7 0"/></keyframe>'
 NONE = np.zeros(0)
+WIDE = {"low": (-1.0, -1.0), "high": (1.0, 1.0)}
 
 
 @pytest.fixture
@@ -204,3 +206,25 @@ def test_what_mujoco_refuses_in_a_urdf_is_told_with_where_to_write_the_cure(here
     (here / "arm.urdf").write_text(URDF.replace(*change))
     with pytest.raises(ValueError, match=re.escape(said)):
         MujocoRobot("arm.urdf", outcome="body:upper:xz")
+
+
+def test_goals_lie_where_postures_without_contacts_put_the_place(here):
+    walled = ARM.replace("</worldbody>", '<geom type="plane" size="2 2 .1" pos="0 0 -.1"/></worldbody>')
+    (here / "walled.xml").write_text(walled, encoding="utf-8")
+    made, shifted = (MujocoRobot("walled.xml", outcome="site:r:tip:x:xz", displacement=d, **WIDE) for d in (0, 1))
+    benchmark, notes, _ = benchmark_of(Task(made), None)
+    distances = np.linalg.norm(benchmark.goals, axis=1)
+    assert 0.1 < distances.min() < 0.25 < 0.55 < distances.max() < 0.65  # an elbow of 20 to 150 degrees, and a tile
+    assert benchmark.goals[:, 1].min() > -0.1 - benchmark.side
+    assert len(benchmark.goals) > 100
+    assert f"use {len(benchmark.goals)} goals, one in each tile of T that random postures reach" in notes[-1]
+    start = made.within_reach() - shifted.within_reach()
+    assert np.abs(start - start[0]).max() < 1e-9
+
+
+@pytest.mark.parametrize("outcome", ["body:pole:xz", "joint:swing"])
+def test_goals_lie_all_over_t_if_the_joints_alone_do_not_say_where_the_place_is(here, outcome):
+    corners = WIDE if outcome.endswith("xz") else {"low": (-1.0,), "high": (1.0,)}
+    robot = MujocoRobot("arm.xml", outcome=outcome, **corners)
+    assert not robot.carries_outcome
+    assert np.array_equal(benchmark_of(Task(robot), None)[0].goals, goals_all_over(robot).goals)

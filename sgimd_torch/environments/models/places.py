@@ -231,6 +231,12 @@ def movable(model: mujoco.MjModel) -> list[int]:
     return [k for k in range(model.njnt) if int(model.jnt_type[k]) in UNITS]
 
 
+def acted(model: mujoco.MjModel) -> set[int]:
+    """Joints that an actuator moves, by tendons, too."""
+    mujoco.mj_forward(model, data := mujoco.MjData(model))
+    return {*model.dof_jntid[data.moment_colind[data.actuator_moment != 0]].tolist()}
+
+
 def check_moved(model: mujoco.MjModel, place: Place, actuators: Sequence[int]) -> None:
     """Refuse a place that no movement of ``actuators`` can change.
 

@@ -28,10 +28,15 @@ def within_ranges(model: mujoco.MjModel, qpos: Array) -> Array:
     return within
 
 
-def touching(model: mujoco.MjModel, data: mujoco.MjData, bodies: Sequence[int]) -> set[tuple[int, int]]:
-    """Pairs of ``bodies`` that touch each other in the state of ``data``, the lower number first."""
+def touching(
+    model: mujoco.MjModel, data: mujoco.MjData, bodies: Sequence[int], *, alone: bool = True
+) -> set[tuple[int, int]]:
+    """Pairs of ``bodies`` that touch each other in the state of ``data``, the lower number first.
+
+    Unless ``alone``, pairs of one of them and another body count, too.
+    """
     pairs = (sorted(int(model.geom_bodyid[geom]) for geom in contact.geom) for contact in _contacts(data))
-    return {(one, other) for one, other in pairs if {one, other} <= {*bodies}}
+    return {(one, other) for one, other in pairs if len({one, other} & {*bodies}) > alone}
 
 
 def nearest_posture(model: mujoco.MjModel, home: Array, joints: Sequence[int], bodies: Sequence[int]) -> Array:

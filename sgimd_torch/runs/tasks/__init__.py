@@ -14,10 +14,10 @@ from typing import Final
 import numpy as np
 
 from sgimd_torch.environments.protocol import Environment, FromFiles, check_instance
-from sgimd_torch.evaluation import Benchmark, load_benchmark
+from sgimd_torch.evaluation import Benchmark, load_benchmark, tile_goals, tile_side
 from sgimd_torch.files import checksum
 from sgimd_torch.learner import Correspondence
-from sgimd_torch.spaces import Array, Box, Demonstration
+from sgimd_torch.spaces import Array, Box, Demonstration, stream
 
 MAX_GOALS: Final = 500  # largest number of benchmark goals for a task that brings none
 
@@ -28,7 +28,8 @@ class Task:
 
     Args:
         environment: robot and world.
-        benchmark: file of benchmark goals, or function that makes them; None: goals all over T.
+        benchmark: file of benchmark goals, or function that makes them; None: goals in T
+            within reach, if the environment knows what is within reach, or else all over T.
         demonstrations: file of a teacher's demonstrations, or function that makes them; None: no teacher.
         correspondence: function (times, trajectory) -> theta_d, eq. (6); None: method of the environment.
 
@@ -64,6 +65,14 @@ def goals_all_over(environment: Environment) -> Benchmark:
     return Benchmark(type(environment).__name__, goals, float(box.sides.max()) / per_side)
 
 
+def goals_within_reach(environment: Environment) -> Benchmark:
+    """One random goal in each tile of T that is known to be within reach; there may be none."""
+    box = environment.outcomes
+    outcomes = environment.within_reach() if isinstance(environment, FromFiles) else np.empty((0, box.dim))
+    side = tile_side(outcomes, box)
+    return Benchmark(type(environment).__name__, tile_goals(outcomes, box, side, stream(0, "goals within reach")), side)
+
+
 def benchmark_of(task: Task, file: Path | None) -> tuple[Benchmark, list[str], str | None]:
     """Goals of evaluation, messages about the robot and its goals, and the checksum of their file (None: no file).
 
@@ -82,6 +91,8 @@ def benchmark_of(task: Task, file: Path | None) -> tuple[Benchmark, list[str], s
         benchmark = load_benchmark(source)
     elif source is not None:
         benchmark = source()
+    elif len((benchmark := goals_within_reach(robot)).goals):
+        notes.append(f"evaluations use {len(benchmark.goals)} goals, one in each tile of T that random postures reach")
     else:
         benchmark = goals_all_over(robot)
         notes.append(
