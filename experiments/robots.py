@@ -207,8 +207,9 @@ def models(page: Page) -> str:
     mean = np.exp(np.log(ratios["ratio"]).mean())
     return (
         f"`sgimd check` on {len(rows)} places in {table['file'].nunique()} unchanged files of {', '.join(packages)}: "
-        f"{', '.join(counts)}; {right} as reading them tells ([rows](model_files.csv)). After 500 movements `practice` "
-        f"errs {mean:.2f} times as much as random movements in the mean of {len(ratios)}, worse by its interval on "
+        f"{', '.join(counts)}; {right} as reading them tells ([rows](model_files.csv)). After 500 movements, at goals "
+        "that postures reach if the joints alone say where the place is, or else all over T, `practice` errs "
+        f"{mean:.2f} times as much as random movements in the mean of {len(ratios)}, worse by its interval on "
         f"{(ratios['low'] > 1).sum()}."
     )
 

@@ -271,6 +271,12 @@ def _landed(
     return landed
 
 
+def grid_over(box: Box, counts: Sequence[int] | Array) -> Array:
+    """``(n, dim)`` centres of equal cells of a box, so many in each dimension."""
+    centres = [low + (np.arange(n) + 0.5) / n * side for low, side, n in zip(box.low, box.sides, counts, strict=True)]
+    return np.stack(np.meshgrid(*centres), axis=-1).reshape(-1, box.dim)
+
+
 def tile_goals(outcomes: Array, box: Box, side: float, rng: np.random.Generator) -> Array:
     """One random goal in each tile of T with two outcomes or more.
 

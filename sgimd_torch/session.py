@@ -47,9 +47,9 @@ if TYPE_CHECKING:
     from sgimd_torch.record import Record
 
 JOINS_EVERY: Final = 30
-"""Number of movements after which one more robot joins, until all of ``at_once`` move.
+"""One robot moves for each so many movements before, until all of ``at_once`` move.
 
-Early movements decide from which family of movements all later ones come, so each should know the outcomes before it.
+Early movements teach most, so each should know the outcomes of those before it.
 """
 
 Execute = Callable[[Sequence[int], Sequence[Array], Sequence[Array]], Sequence[Array | Failure]]
@@ -94,7 +94,7 @@ def run(
         record: record to write. Its events are replayed first; the replay executes nothing and asks no teacher of
             ``teachers``. Learner and teacher must be freshly built.
         failures: number of failed movements in a row that ends the run, at least 1.
-        at_once: number of robots that move at once, at least 1; after each 30 movements one more robot joins.
+        at_once: number of robots that move at once, at least 1; at first one, then one for each 30 movements before.
             `BatchEnvironment.execute_many` executes their movements; other environments execute them one by one.
 
     Yields:
@@ -150,7 +150,7 @@ def run(
                     failed_in_a_row.append(outcome)
                     yield Episode(first + place, seen, move, None, *preceding, outcome.reason)
                 else:
-                    if move is not None:
+                    if move is not None and len(failed_in_a_row) < failures:
                         failed_in_a_row.clear()
                     yield Episode(first + place, seen, move, outcome, *preceding)
             if len(failed_in_a_row) >= failures:

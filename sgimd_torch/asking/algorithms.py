@@ -25,6 +25,7 @@ from sgimd_torch.searches.explore import Anywhere
 from sgimd_torch.searches.simplex import NelderMead
 from sgimd_torch.strategies import Emulate, GoalBabbling, Mimic
 
+# `practice`, but goals by interest; competence is that of the attempt, not of the memory.
 STRATEGIC: Final[dict[str, Any]] = {**PRACTICE, "goals": StrategicInterest, "judge": AttemptCompetence}
 SEARCHING: Final[dict[str, Any]] = {
     "search": NelderMead,
@@ -52,7 +53,7 @@ def sgim_acts(
     memory: Memory | None = None,
     **parts: Any,
 ) -> Learner:
-    """SGIM-ACTS: practice in one family; chooses when, whom and what to ask, and how to use the answer.
+    """SGIM-ACTS: practice that chooses when, whom and what to ask, and how to use the answer.
 
     By default it practises and executes each demonstration once.
 
@@ -84,7 +85,7 @@ def sgim_acts(
 
 
 sgim_im = partial(sgim_acts, emulates=False)
-"""SGIM-IM: practice in one family; chooses when to ask its teacher, and for which goal; only imitates."""
+"""SGIM-IM: practice that chooses when to ask its teacher, and for which goal; only imitates."""
 sgim_acts_search = partial(sgim_acts, **SEARCHING)
 """SGIM-ACTS, as published: a search at each goal instead of practice."""
 sgim_im_search = partial(sgim_im, **SEARCHING)

@@ -97,8 +97,8 @@ def squared(differences: Array) -> Array:
 
 
 def gains_over(errors: Array, other_errors: Array, noise: float) -> Array:
-    """By how much others predict better, ``(n,)``: log ratios of squared errors; the standard deviation of the
-    ``noise`` limits both."""
+    """By how much others predict better, ``(n,)``: log ratios of errors. Errors are given squared; the variance of the
+    ``noise`` is added to them."""
     floor = noise**2 + 1e-300
     return np.clip(0.5 * np.log((errors + floor) / (other_errors + floor)), -_LARGEST_GAIN, _LARGEST_GAIN)
 

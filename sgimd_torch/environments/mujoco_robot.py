@@ -22,15 +22,17 @@ from sgimd_torch.environments.controllers import Controller
 from sgimd_torch.environments.models.file import file_of, load_model
 from sgimd_torch.environments.models.look import NEARLY, SUNK, listed, missed, parts, reached
 from sgimd_torch.environments.models.places import (
-    acted,
     body_of,
     check_moved,
     commands_box,
     context_box,
+    coupled,
     hand_of,
+    held_by_servos,
     holding,
     joint_of,
     joints_above,
+    movable,
     moved_by,
     outcome_places,
     path_to,
@@ -168,7 +170,7 @@ class MujocoRobot:
         self.primitive = self._controller if isinstance(self._controller, Primitive) else Primitive()
         if isinstance(self._controller, GaussianPrimitive):
             self.correspondence = self._controller.correspondence
-        self.policies, self._sides = self._controller.policies, commands.sides
+        self.policies, self._ranges = self._controller.policies, commands
         self.bodies = moved_by(self.model, self._actuators)
         self.contexts, self._addresses = context_box(self.model, context)
         self._places = outcome_places(self.model, outcome)
@@ -210,25 +212,37 @@ class MujocoRobot:
 
     @property
     def carries_outcome(self) -> bool:
-        """Whether the joints of the robot alone say where the measured places are."""
-        for place in self._places:
-            body = body_of(self.model, place)
-            alone = place.name in self.joints if place.kind == "joint" else body in self.bodies
-            if not alone or (place.axes and {*joints_above(self.model, body)} - acted(self.model)):
-                return False
-        return bool(self.joints)
+        """Whether the joints of the robot alone say where the measured places are, if its base does not move."""
+        bodies = {body_of(self.model, place) for place in self._places if place.axes}
+        joints = {place.name for place in self._places if not place.axes}
+        free = {*movable(self.model)} - held_by_servos(self.model)
+        own = bool(self.joints) and joints <= {*self.joints} and bodies <= {*self.bodies}
+        return own and not free & self._above
 
     def within_reach(self) -> Array:
-        """``(n, outcome_dim)``, measured places in random postures without contacts; see `FromFiles`."""
-        ranges, outcomes, rng = self.primitive.ranges, list[Array](), stream(0, "postures")
-        start = self._read(self._home) if self._displacement else np.zeros(self._dim)
-        for _ in range(POSTURES if ranges is not None and self.carries_outcome else 0):
-            assert ranges is not None
-            outcomes.append(self.outcome_at(ranges.sample(rng)) - start)
-            mujoco.mj_collision(self.model, data := self._data[0])
-            if touching(self.model, data, self.bodies, alone=False):
-                outcomes.pop()
+        """``(n, outcome_dim)``, measured places in random postures without contacts, of the joints between base and
+        places; none if anything else moves these, too."""
+        model, ranges, displaced = self.model, self._ranges, self._displacement
+        above, own = self._above, [model.joint(name).id for name in self.joints]
+        starts_vary = displaced and {*self._addresses} & {int(model.jnt_qposadr[joint]) for joint in above}
+        known = self.carries_outcome and above <= {*movable(model)} and not coupled(model, above)
+        if not known or starts_vary:
+            return np.empty((0, self._dim))
+        low, high = (np.where(np.isin(own, [*above]), side, self.start) for side in (ranges.low, ranges.high))
+        limits = np.where(model.jnt_limited[own], model.jnt_range[own].T, [[-np.inf], [np.inf]])
+        low, high = np.clip(low, *limits), np.clip(high, *limits)
+        start, outcomes, rng = displaced * self._read(self._home), list[Array](), stream(0, "postures")
+        for _ in range(POSTURES):
+            outcome = self.outcome_at(rng.uniform(low, high)) - start
+            mujoco.mj_collision(model, data := self._data[0])
+            if not touching(model, data, self.bodies, alone=False):
+                outcomes.append(outcome)
         return np.reshape(outcomes, (-1, self._dim))
+
+    @property
+    def _above(self) -> set[int]:
+        """Joints between the base and the measured places."""
+        return {k for place in self._places for k in joints_above(self.model, body_of(self.model, place))}
 
     def commanded(self, theta: Array) -> Array:
         """``(n_steps, n_commands)``, commands of a movement without noise, one for each timestep of the model."""
@@ -343,7 +357,7 @@ class MujocoRobot:
         controller = self._controller
         lasts = controller.duration(theta) if isinstance(controller, GaussianPrimitive) else self._longest
         # Noise is drawn even if ``noise`` is 0, so that later draws do not depend on ``noise``.
-        shift = self.noise * self._sides * rng.standard_normal(len(self._sides))
+        shift = self.noise * self._ranges.sides * rng.standard_normal(self._ranges.dim)
         commands = self._still(lasts)
         times = np.minimum(self.model.opt.timestep * np.arange(len(commands)), lasts)
         commands[:, self._actuators] = controller.at(theta, times) + shift

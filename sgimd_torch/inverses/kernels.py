@@ -213,7 +213,7 @@ def expected(process: GaussianProcess, covariance: Array) -> Array:
 
 @jit_helper
 def expected_error(process: GaussianProcess, goal: Array, inflation: float, covariance: Array, limit: float) -> float:
-    """Expected squared error, with ``inflation`` times the variance; inexact, and at least ``limit``, from there on."""
+    """Squared bias plus ``inflation`` times the variance; the squared bias alone if that is ``limit`` or more."""
     error = squared_distance(expected(process, covariance), goal)
     return error if error >= limit else error + inflation * variance_at(process, covariance)
 
@@ -288,7 +288,7 @@ def answer(
     box: Array,
 ) -> tuple[Array, Array, float]:
     """theta of the candidate with the least expected squared error, noise included, its expected outcome, and the
-    standard deviation from that.
+    standard deviation of the outcome from it.
 
     Each start has a process of its own, of the movements most like it, and with it a variance and a noise of its own.
     So a slow movement is preferred to a fast one that cannot be repeated. Candidates are each start, the end of steps

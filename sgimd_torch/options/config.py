@@ -52,7 +52,7 @@ class Config:
         demonstrations: file of recorded demonstrations; null: the environment's own.
         begin_with: run.sqlite or csv of another robot or simulator to begin with; null: none.
         failures: number of failed movements in a row that stops the run; null: 10.
-        at_once: number of robots that move at once; after each 30 movements one more robot joins.
+        at_once: number of robots that move at once; at first one, then one for each 30 movements before.
         context: previous: theta of the movement before, for robots with memory; null: no theta.
         parts: parts and their options by name, such as "goals" or "goals.window"; defaults may be left out.
 

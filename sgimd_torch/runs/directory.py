@@ -160,7 +160,9 @@ def _reopened(path: Path, about: dict[str, Any], dims: Dims, parts: RunParts, no
             raise RunError(f"{path} has {record.movements} movements already, {config.movements} were requested")
         if "until" not in others:
             about["ended_early"] = record.about["ended_early"]
-        _forget_evaluations(record, config, about["ended_early"], anew=bool(others & {*EVALUATES}), notes=notes)
+        earlier_goals, goals = np.array([goal for _, *goal in record.rows("goals")]), parts.benchmark.goals
+        anew = bool(others & {*EVALUATES}) or len(earlier_goals) != len(goals) or not np.allclose(earlier_goals, goals)
+        _forget_evaluations(record, config, about["ended_early"], anew=anew, notes=notes)
         if not parts.learner.problem.trained:
             for table in OF_MODEL:
                 record.replace_rows(table, ())

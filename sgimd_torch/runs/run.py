@@ -50,7 +50,7 @@ def run_one(parts: RunParts, stopping: Stopping, *, resume: bool, again: str) ->
         try:
             loop.go_on(stopping)
         except Stopped:
-            say(f"stopped after {loop.movements} movements; to go on: {again}")
+            say(f"stopped after {loop.record.movements} movements; to go on: {again}")
             raise
         except (ReplayError, RunError) as error:
             raise RunError(str(error)) from error
@@ -63,7 +63,7 @@ def run_one(parts: RunParts, stopping: Stopping, *, resume: bool, again: str) ->
             said = str(error) if raised is not error else reason_of(error)
             if isinstance(error, NoOutcomeError):
                 said += " (--failures says how many in a row end a run)"
-            raise Failed(f"{said}; {loop.movements} movements are kept; to go on: {again}") from error
+            raise Failed(f"{said}; {loop.record.movements} movements are kept; to go on: {again}") from error
         return loop.summary
 
 
@@ -104,7 +104,7 @@ class RunLoop(AbstractContextManager["RunLoop"]):
             board = BoardListener(parts.config.directory, parts, self.seconds.summary, self._curves)
             self.listeners.append(board)
         self._wanted = parts.config.evaluations  # numbers of movements before the evaluations to come
-        self._committed_at, self._kept, self._told = time.monotonic(), self.recorded, False  # at the last commit
+        self._committed_at, self._kept, self._is_told = time.monotonic(), self.recorded, False  # that nothing is kept
         self._remarked = {*self.record.about.setdefault("remarks", {})}  # kinds of remarks that were told
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
@@ -192,13 +192,13 @@ class RunLoop(AbstractContextManager["RunLoop"]):
         self._committed_at = time.monotonic()
         self.record.about["seconds"] = self.seconds.summary()
         if self.record.commit():
-            self._kept, self._told = self.movements, False
+            self._kept, self._is_told = self.movements, False
             for listener in self.listeners:
                 listener.flush()
             return True
-        if not self._told:
+        if not self._is_told:
             say(f"another program reads {self.record.path}: until it ends, nothing after movement {self._kept} is kept")
-        self._told = True
+        self._is_told = True
         return False
 
     def _keep(self) -> None:
@@ -347,7 +347,7 @@ class Listening(Protocol):
         Args:
             directory: directory of the run.
             refreshes: rows of this table in the record of the run.
-            span: number of movements at which the checkpoint may be, above the first and up to the second.
+            span: the checkpoint was made after more movements than the first number, and at most the second.
         """
 
 
@@ -385,7 +385,7 @@ def executing(
 
     Args:
         environment: environment of the movements.
-        make: constructor of the environment.
+        make: function that makes the environment, or a task with it, in each process.
         seed: number from which the random streams of the environment come.
         at_once: number of robots that move at once.
     """

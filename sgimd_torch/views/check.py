@@ -125,7 +125,7 @@ def _lessons(task: Task) -> list[str]:
     places = np.array([demonstration.outcome for demonstration in demonstrations])
     tried = [check(task, demonstration, row) for row, demonstration in enumerate(demonstrations[:TRIED])]
     apart, spread = np.median([checked.apart for checked in tried]), np.linalg.norm(places.std(axis=0))
-    if not apart < max(spread / 2, 3 * task.environment.outcome_noise):
+    if not apart <= max(spread / 2, 3 * task.environment.outcome_noise):
         amount = task.environment.outcomes.amount(float(apart))
         notes = [
             *notes,

@@ -26,8 +26,8 @@ from own import MODULE
 from sgimd_torch.__main__ import _call
 from sgimd_torch.options.catalogue import WORDS
 from sgimd_torch.options.command_line import parse
-from sgimd_torch.runs import tasks
 from sgimd_torch.runs.signals import command
+from sgimd_torch.runs.tasks import goals as goals_of_tasks
 
 ROOT = Path(__file__).parents[2]
 ALONE = ("README.md", "CONTRIBUTING.md")  # each block by itself
@@ -113,7 +113,7 @@ def folder(tmp_path, monkeypatch):
     before = set(sys.modules)
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr(tasks, "MAX_GOALS", 40)
+    monkeypatch.setattr(goals_of_tasks, "MAX_GOALS", 40)
     yield tmp_path
     for name in set(sys.modules) - before:
         if (getattr(sys.modules[name], "__file__", None) or "").startswith(str(tmp_path)):

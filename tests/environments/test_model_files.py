@@ -9,7 +9,8 @@ import pytest
 
 from sgimd_torch import MujocoRobot, check_environment, stream
 from sgimd_torch.environments.models.posture import NEAR, nearest_posture
-from sgimd_torch.runs.tasks import Task, benchmark_of, goals_all_over
+from sgimd_torch.runs.tasks import Task, benchmark_of
+from sgimd_torch.runs.tasks.goals import goals_all_over, goals_within_reach
 from urdf import URDF
 
 # Two links of .3 m under gravity, with motors; the second one begins outside its range, and carries a pole that swings.
@@ -214,10 +215,10 @@ def test_goals_lie_where_postures_without_contacts_put_the_place(here):
     made, shifted = (MujocoRobot("walled.xml", outcome="site:r:tip:x:xz", displacement=d, **WIDE) for d in (0, 1))
     benchmark, notes, _ = benchmark_of(Task(made), None)
     distances = np.linalg.norm(benchmark.goals, axis=1)
-    assert 0.1 < distances.min() < 0.25 < 0.55 < distances.max() < 0.65  # an elbow of 20 to 150 degrees, and a tile
-    assert benchmark.goals[:, 1].min() > -0.1 - benchmark.side
+    assert 0.1 < distances.min() < 0.25 < 0.55 < distances.max() < 0.6  # an elbow of 20 to 150 degrees
+    assert benchmark.goals[:, 1].min() > -0.1
     assert len(benchmark.goals) > 100
-    assert f"use {len(benchmark.goals)} goals, one in each tile of T that random postures reach" in notes[-1]
+    assert f"use {len(benchmark.goals)} points, one in each tile of T that random postures reach" in notes[-1]
     start = made.within_reach() - shifted.within_reach()
     assert np.abs(start - start[0]).max() < 1e-9
 
@@ -228,3 +229,35 @@ def test_goals_lie_all_over_t_if_the_joints_alone_do_not_say_where_the_place_is(
     robot = MujocoRobot("arm.xml", outcome=outcome, **corners)
     assert not robot.carries_outcome
     assert np.array_equal(benchmark_of(Task(robot), None)[0].goals, goals_all_over(robot).goals)
+
+
+@pytest.mark.parametrize(
+    ("change", "options", "known"),
+    [
+        ("", {}, True),
+        ('<equality><joint joint1="r:2" joint2="r:1"/></equality>', {}, False),
+        ('<equality><connect body1="pole" body2="fore" anchor="0 0 0"/></equality>', {}, True),  # within the hand
+        ('<equality><connect body1="fore" body2="base" anchor="0 0 0"/></equality>', {}, False),
+        ("", {"displacement": True, "context": "joint:r:1:-1:1"}, False),
+        ("", {"low": (0.3, 0.3), "high": (0.31, 0.31)}, False),  # hardly a posture ends there
+        ("", {"joints": ("r:2",)}, True),
+        ("", {"joints": ("r:2",), "servos": "file"}, False),  # a motor does not hold the other joint
+    ],
+)
+def test_what_is_within_reach_is_known_if_nothing_but_the_joints_decides_it(here, change, options, known):
+    (here / "changed.xml").write_text(ARM.replace("</mujoco>", change + "</mujoco>"), encoding="utf-8")
+    robot = MujocoRobot("changed.xml", outcome="site:r:tip:x:xz", **(WIDE | options))
+    assert (goals_within_reach(robot) is not None) == known
+
+
+def test_postures_keep_within_the_ranges_of_joints_and_move_only_joints_of_the_place(here):
+    wide = '<position joint="r:1" kp="50" ctrlrange="-3 3"/><position joint="r:2" kp="50" ctrlrange="-3 3"/>'
+    (here / "wide.xml").write_text(re.sub("<motor.*/>", wide, ARM), encoding="utf-8")
+    robot = MujocoRobot("wide.xml", outcome="joint:r:1,joint:r:2", low=(-3.0, -3.0), high=(3.0, 3.0))
+    reach = np.rad2deg(robot.within_reach())
+    assert (reach.min(axis=0) >= [-150.001, 19.999]).all()
+    assert (reach.max(axis=0) <= 150.001).all()
+    upper = MujocoRobot("wide.xml", outcome="joint:r:1", low=(-3.0,), high=(3.0,))
+    robot.outcome_at(robot.start)
+    assert np.ptp(upper.within_reach()) > 2
+    assert upper._data[0].qpos[1] == pytest.approx(upper.start[1])

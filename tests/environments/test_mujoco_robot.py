@@ -48,6 +48,7 @@ ARM = """<mujoco>
 TOOTH = "v 0 0 0\nv .01 0 0\nv 0 .01 0\nv 0 0 .01\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 LIMITS = np.deg2rad([120, 90])
 CORNERS = {"low": (-1.0, -1.0), "high": (1.0, 1.0)}
+IN_DEGREES = 'gainprm="1.047" biastype="affine" biasprm="0 -60 -6" ctrlrange="-90 90"'
 NONE = np.zeros(0)
 
 
@@ -107,6 +108,16 @@ def test_servos_are_made_for_a_urdf_and_hold_the_arm_against_gravity(here):
     ended = robot.execute(NONE, steady(0.6, -0.4, limits=(1, 1)), stream(0, "x"))
     assert ended == pytest.approx([0.6, -0.4], abs=0.06)
     assert robot.outcomes.axis(0) == "shoulder (rad)"
+
+
+def test_a_command_in_another_unit_is_not_taken_for_the_position_of_its_joint(here):
+    scaled = ARM.replace('<position joint="elbow" kp="60" kv="6"/>', f'<general joint="elbow" {IN_DEGREES}/>')
+    (here / "scaled.xml").write_text(scaled)
+    robots = {file: MujocoRobot(file, outcome="site:tip:xy", **CORNERS) for file in ("arm.xml", "scaled.xml")}
+    assert [(robot.joints, robot.carries_outcome) for robot in robots.values()] == [
+        (("shoulder", "elbow"), True),
+        ((), False),
+    ]
 
 
 def test_meshes_of_a_ros_package_are_found_from_its_folder_on(here):

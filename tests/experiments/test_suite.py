@@ -6,7 +6,7 @@ from sgimd_torch.options.build import task_of
 from sgimd_torch.options.config import Config
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.signals import command
-from sgimd_torch.runs.tasks import goals_all_over
+from sgimd_torch.runs.tasks.goals import goals_all_over
 from suite import RANDOM, TASKS, UNIFORM, main, parsed_options, runs_of
 
 SHORT = ("--movements", "20", "--evaluate-at", "20", "--processes", "1")

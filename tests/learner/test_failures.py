@@ -17,8 +17,8 @@ from sgimd_torch.evaluation import contexts_of_goals, evaluate
 from sgimd_torch.options.command_line import main
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.signals import command
-from sgimd_torch.session import NoOutcomeError, run
-from sgimd_torch.spaces import Array, Episode, stream
+from sgimd_torch.session import NoOutcomeError, live, run
+from sgimd_torch.spaces import Array, Episode, Failure, stream
 from worlds import ArmThat
 
 
@@ -118,6 +118,19 @@ def test_too_many_failures_in_a_row_end_a_run_which_can_go_on() -> None:
     again = list(run(learner, arm, 0, movements=20, failures=3))
     assert [episode.index for episode in again] == list(range(8, 20))
     assert len(learner.memory) == 15
+
+
+def test_a_failure_ends_a_run_though_the_robot_beside_it_has_an_outcome() -> None:
+    arm = PlanarArm(5)
+    learner, moves = practice(arm, 0), live(arm, 0)
+
+    def execute(indices, contexts, thetas):
+        outcomes = moves(indices, contexts, thetas)
+        return [Failure("jammed") if index == 60 else outcome for index, outcome in zip(indices, outcomes, strict=True)]
+
+    with pytest.raises(NoOutcomeError, match="1 movements in a row failed, the last one: jammed"):
+        list(run(learner, arm, 0, movements=70, execute=execute, failures=1, at_once=2))
+    assert learner.movements == 62
 
 
 @pytest.mark.parametrize("together", [False, True])

@@ -24,7 +24,7 @@ from sgimd_torch.options.config import RUN, Config, all_options, words
 from sgimd_torch.options.help import overview
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.signals import command
-from sgimd_torch.runs.tasks import MAX_GOALS, goals_all_over
+from sgimd_torch.runs.tasks.goals import MAX_GOALS, goals_all_over
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Box
 

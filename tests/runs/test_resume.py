@@ -6,6 +6,7 @@ import shutil
 import signal
 import sqlite3
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -24,6 +25,7 @@ from runs import (
 )
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.inverses.locally_linear import LocallyLinear
+from sgimd_torch.options import build
 from sgimd_torch.options.command_line import main
 from sgimd_torch.record import Record
 from sgimd_torch.runs import evaluations
@@ -31,6 +33,7 @@ from sgimd_torch.runs import run as run_module
 from sgimd_torch.runs.directory import RUN_FILE
 from sgimd_torch.runs.read import movements_on_disk, read_run
 from sgimd_torch.runs.signals import command
+from sgimd_torch.runs.tasks import benchmark_of
 from sgimd_torch.spaces import stream
 
 # On the arm: a learner with regions, one that asks, one with a model; and one in contexts.
@@ -156,6 +159,21 @@ def test_a_resumed_run_makes_only_the_evaluations_that_are_missing_or_asked_for(
 def copy(tmp_path, undisturbed):
     """A copy of the uninterrupted run."""
     return shutil.copytree(undisturbed, tmp_path / "sgim-d" / "seed-003")
+
+
+@pytest.mark.parametrize("others", [lambda goals: goals[1:], lambda goals: 0.9 * goals])
+def test_if_the_robot_now_has_other_goals_all_evaluations_are_repeated(tmp_path, copy, go, monkeypatch, capsys, others):
+    def changed(*arguments):
+        benchmark, *rest = benchmark_of(*arguments)
+        return replace(benchmark, goals=others(benchmark.goals)), *rest
+
+    before = read_run(copy)
+    monkeypatch.setattr(build, "benchmark_of", changed)
+    assert go(tmp_path, "--resume") == 0
+    assert "evaluations after 30, 60, 90 movements are dropped, or repeated" in capsys.readouterr().err
+    now = read_run(copy)
+    assert np.array_equal(now.benchmark, others(before.benchmark))
+    assert {len(now.missed_by(movements)[0]) for movements in (30, 60, 90)} == {len(now.benchmark)}
 
 
 @pytest.mark.parametrize(

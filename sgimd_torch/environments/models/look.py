@@ -11,7 +11,7 @@ from typing import Final
 import mujoco
 import numpy as np
 
-from sgimd_torch.environments.models.places import UNITS, acted, joints_above, movable, pulled
+from sgimd_torch.environments.models.places import UNITS, joints_above, movable, pulled
 from sgimd_torch.spaces import Array, Box
 
 NEARLY: Final = 1e-3  # share of a side of Pi by which two nearly equal thetas differ
@@ -25,8 +25,10 @@ _PARTS: Final = 4  # number of parts of each side of T whose visits are counted
 
 def parts(model: mujoco.MjModel, bodies: Sequence[int]) -> list[str]:
     """What no actuator moves, of ``bodies`` also their ball joints and a floating base."""
+    mujoco.mj_forward(model, data := mujoco.MjData(model))
+    acted = {*model.dof_jntid[data.moment_colind[data.actuator_moment != 0]]}  # by tendons, too
     able = {*movable(model), *(k for body in bodies for k in joints_above(model, body))}
-    passive = [model.joint(k).name for k in sorted(able - acted(model))]
+    passive = [model.joint(k).name for k in sorted(able - acted)]
     held = [model.body(body).name for _, body in pulled(model)]
     lines = [f"without an actuator, so they move freely: {listed(passive)}"] if passive else []
     return [*lines, f"mocap bodies hold {listed(held)}; --environment.servos made frees them"] if held else lines

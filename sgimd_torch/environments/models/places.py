@@ -198,7 +198,9 @@ def holding(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
 
 def positions(model: mujoco.MjModel, actuators: Sequence[int]) -> tuple[str, ...]:
     """Names of the joints whose positions the commands of ``actuators`` are; () if a command is anything else."""
-    joints = [joint_of(model, k) if is_servo(model, k) and model.actuator_gear[k, 0] == 1 else None for k in actuators]
+    unscaled = (model.actuator_gear[:, 0] == 1) & (model.actuator_biasprm[:, 0] == 0)
+    unscaled &= np.isclose(model.actuator_gainprm[:, 0], -model.actuator_biasprm[:, 1])
+    joints = [joint_of(model, k) if is_servo(model, k) and unscaled[k] else None for k in actuators]
     return () if None in joints else tuple(model.joint(k).name for k in joints)
 
 
@@ -231,10 +233,26 @@ def movable(model: mujoco.MjModel) -> list[int]:
     return [k for k in range(model.njnt) if int(model.jnt_type[k]) in UNITS]
 
 
-def acted(model: mujoco.MjModel) -> set[int]:
-    """Joints that an actuator moves, by tendons, too."""
-    mujoco.mj_forward(model, data := mujoco.MjData(model))
-    return {*model.dof_jntid[data.moment_colind[data.actuator_moment != 0]].tolist()}
+def held_by_servos(model: mujoco.MjModel) -> set[int]:
+    """Joints that position servos move or hold."""
+    return {joint for k in range(model.nu) if is_servo(model, k) and (joint := joint_of(model, k)) is not None}
+
+
+def coupled(model: mujoco.MjModel, joints: set[int]) -> bool:
+    """Whether an equality couples one of ``joints`` to another joint, or to a body that the joint does not carry."""
+    for k in np.flatnonzero(model.eq_active0):
+        kind, ends = int(model.eq_type[k]), [int(model.eq_obj1id[k]), int(model.eq_obj2id[k])]
+        if kind == mujoco.mjtEq.mjEQ_JOINT:
+            tied = {*ends}
+        elif kind in (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD):
+            at_sites = model.eq_objtype[k] == mujoco.mjtObj.mjOBJ_SITE
+            one, other = (joints_above(model, int(model.site_bodyid[end]) if at_sites else end) for end in ends)
+            tied = {*one} ^ {*other}
+        else:
+            continue
+        if tied & joints:
+            return True
+    return False
 
 
 def check_moved(model: mujoco.MjModel, place: Place, actuators: Sequence[int]) -> None:

@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.evaluation import Benchmark, tile_goals
-from sgimd_torch.runs.tasks import Task, grid_over
+from sgimd_torch.evaluation import Benchmark, grid_over, tile_goals
+from sgimd_torch.runs.tasks import Task
 from sgimd_torch.spaces import Demonstration, stream
 
 SIDE: Final = 0.1  # m, side of a benchmark tile; the disc of radius 1 m that an arm reaches has 311 goals
