@@ -104,7 +104,7 @@ class RunLoop(AbstractContextManager["RunLoop"]):
             board = BoardListener(parts.config.directory, parts, self.seconds.summary, self._curves)
             self.listeners.append(board)
         self._wanted = parts.config.evaluations  # numbers of movements before the evaluations to come
-        self._committed_at, self._kept, self._is_told = time.monotonic(), self.recorded, False  # that nothing is kept
+        self._committed_at, self._kept, self._is_told = time.monotonic(), self.recorded, False  # told: that nothing is kept
         self._remarked = {*self.record.about.setdefault("remarks", {})}  # kinds of remarks that were told
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
