@@ -104,7 +104,7 @@ class RunLoop(AbstractContextManager["RunLoop"]):
             board = BoardListener(parts.config.directory, parts, self.seconds.summary, self._curves)
             self.listeners.append(board)
         self._wanted = parts.config.evaluations  # numbers of movements before the evaluations to come
-        self._committed_at, self._kept, self._is_told = time.monotonic(), self.recorded, False  # told: that nothing is kept
+        self._committed_at, self._kept, self._warned = time.monotonic(), self.recorded, False  # of the last commit
         self._remarked = {*self.record.about.setdefault("remarks", {})}  # kinds of remarks that were told
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
@@ -192,13 +192,13 @@ class RunLoop(AbstractContextManager["RunLoop"]):
         self._committed_at = time.monotonic()
         self.record.about["seconds"] = self.seconds.summary()
         if self.record.commit():
-            self._kept, self._is_told = self.movements, False
+            self._kept, self._warned = self.movements, False
             for listener in self.listeners:
                 listener.flush()
             return True
-        if not self._is_told:
+        if not self._warned:
             say(f"another program reads {self.record.path}: until it ends, nothing after movement {self._kept} is kept")
-        self._is_told = True
+        self._warned = True
         return False
 
     def _keep(self) -> None:
