@@ -289,7 +289,7 @@ def tile_goals(outcomes: Array, box: Box, side: float, rng: np.random.Generator)
     Returns:
         ``(n_tiles, outcome_dim)``, in the order of the tiles.
     """
-    tiles = _reached(outcomes, box, side)
+    tiles = _tiles(outcomes[rows_in_tiles(outcomes, box, side)], box, side)
     return box.clip(box.low + (tiles + rng.random(tiles.shape)) * side)
 
 
@@ -308,21 +308,23 @@ def tile_sides(outcomes: Array, box: Box) -> Array:
 def tile_side(outcomes: Array, box: Box, tiles: int = TILES) -> float:
     """The one of `tile_sides` with which about ``tiles`` tiles have two outcomes or more; see `tile_goals`."""
     inside = outcomes[box.contains(outcomes)]
-    return float(min(tile_sides(outcomes, box), key=lambda side: abs(len(_reached(inside, box, side)) - tiles)))
+    return float(min(tile_sides(outcomes, box), key=lambda side: abs(len(rows_in_tiles(inside, box, side)) - tiles)))
 
 
-def _reached(outcomes: Array, box: Box, side: float) -> Array:
-    """``(n_tiles, dim)``, tiles of T with two outcomes or more, numbered in each dimension from T's lower corner."""
-    inside = outcomes[box.contains(outcomes)]
-    tiles = np.floor((inside - box.low) / side)
+def rows_in_tiles(outcomes: Array, box: Box, side: float) -> NDArray[np.intp]:
+    """Row of the first outcome in each tile of T that has two or more, in the order of the tiles; see `tile_goals`."""
+    rows = np.flatnonzero(box.contains(outcomes))
+    tiles = _tiles(outcomes[rows], box, side)
     per_side = np.floor(box.sides / side) + 1
     if np.log2(per_side).sum() < 53:  # one number for each tile, because numbers are quicker to sort than rows
-        numbers = tiles @ np.append(np.cumprod(per_side[:0:-1])[::-1], 1.0)
-        _, first, counts = np.unique(numbers, return_index=True, return_counts=True)
-        tiles = tiles[first]
-    else:
-        tiles, counts = np.unique(tiles, axis=0, return_counts=True)
-    return np.asarray(tiles[counts > 1])
+        tiles = tiles @ np.append(np.cumprod(per_side[:0:-1])[::-1], 1.0)
+    _, first, counts = np.unique(tiles, return_index=True, return_counts=True, axis=0 if tiles.ndim > 1 else None)
+    return np.asarray(rows[first[counts > 1]])
+
+
+def _tiles(outcomes: Array, box: Box, side: float) -> Array:
+    """``(n, dim)``, tile of each outcome, numbered in each dimension from T's lower corner."""
+    return np.floor((outcomes - box.low) / side)
 
 
 def save_benchmark(path: str | os.PathLike[str], benchmark: Benchmark) -> None:

@@ -158,6 +158,7 @@ class MujocoRobot:
         commands, self._actuators, said = commands_box(self.model, joints, self._held)
         self.remarks += said
         self.joints = positions(self.model, self._actuators)
+        self._joint_ids = [self.model.joint(name).id for name in self.joints]
         make = controller or partial(
             GaussianPrimitive,
             durations=durations,
@@ -223,7 +224,7 @@ class MujocoRobot:
         """``(n, outcome_dim)``, measured places in random postures without contacts, of the joints between base and
         places; none if anything else moves these, too."""
         model, ranges, displaced = self.model, self._ranges, self._displacement
-        above, own = self._above, [model.joint(name).id for name in self.joints]
+        above, own = self._above, self._joint_ids
         starts_vary = displaced and {*self._addresses} & {int(model.jnt_qposadr[joint]) for joint in above}
         known = self.carries_outcome and above <= {*movable(model)} and not coupled(model, above)
         if not known or starts_vary:
@@ -251,7 +252,7 @@ class MujocoRobot:
     def outcome_at(self, joints: Array) -> Array:
         """``(outcome_dim,)``, measured places when the robot's joints are at ``(n_joints,)`` rad; other things rest."""
         data = self._at(self._home)
-        data.qpos[[self.model.joint(name).qposadr[0] for name in self.joints]] = joints
+        data.qpos[self.model.jnt_qposadr[self._joint_ids]] = joints
         mujoco.mj_kinematics(self.model, data)
         return np.concatenate([place.read(data) for place in self._places])
 
@@ -442,7 +443,7 @@ class MujocoRobot:
         if self.joints:
             ends = np.stack([self.positions(one[-1]) for _, one, _ in right])
             last = np.stack([sent[self._actuators] for sent, _, _ in right])
-            lines += missed(self.model, [self.model.joint(name).id for name in self.joints], ends, last)
+            lines += missed(self.model, self._joint_ids, ends, last)
         if isinstance(self._controller, GaussianPrimitive):
             lasts = [self._controller.duration(theta) for theta in thetas]
             if max(lasts) > self._longest:

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from sgimd_torch.environments.protocol import Environment, FromFiles, beside_execute
-from sgimd_torch.evaluation import Benchmark, grid_over, tile_side
+from sgimd_torch.evaluation import Benchmark, grid_over, rows_in_tiles, tile_side
 
 MAX_GOALS: Final = 500  # largest number of goals all over T
 FEWEST: Final = 500  # least number of known outcomes in T that show what is within reach
@@ -35,9 +35,7 @@ def goals_within_reach(environment: Environment) -> Benchmark | None:
     if len(outcomes) < FEWEST:
         return None
     side = tile_side(outcomes, box)
-    tiles = np.floor((outcomes - box.low) / side)
-    _, first, counts = np.unique(tiles, axis=0, return_index=True, return_counts=True)
-    return Benchmark(type(environment).__name__, outcomes[first[counts > 1]], side)
+    return Benchmark(type(environment).__name__, outcomes[rows_in_tiles(outcomes, box, side)], side)
 
 
 def goals_all_over(environment: Environment) -> Benchmark:
