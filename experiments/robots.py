@@ -189,11 +189,30 @@ def after_change(evidence: Evidence, robot: str, change: str, learner: str, at: 
     return errors
 
 
+def learnt_models(evidence: Evidence) -> pd.DataFrame:
+    """The rows of the model files that `practice` has learnt, with its error over that of random movements.
+
+    Raises:
+        NotRun: there is none.
+    """
+    rows = evidence.models.dropna(subset="ratio")
+    if rows.empty:
+        raise NotRun("model files")
+    return rows
+
+
+def times_random_on_models(evidence: Evidence, *, level: Level = LEVEL) -> Interval:
+    """The geometric mean over model files of the error of `practice` divided by that of random movements."""
+    return geometric_mean(learnt_models(evidence)["ratio"], level=level)
+
+
 def models(page: Page) -> str:
     """What came of model files that nobody made for this library."""
     table = page.evidence.models
-    if (ratios := table.dropna(subset="ratio")).empty:
-        page.missing.append("model files")
+    try:
+        learnt = learnt_models(page.evidence)
+    except NotRun as missing:
+        page.missing.append(str(missing))
         return "Not run."
     expected = {(file.path, file.outcome, file.options): file.expected for file in FILES}
     rows = table.to_dict("records")
@@ -204,13 +223,12 @@ def models(page: Page) -> str:
     )
     packages = dict.fromkeys(f"{row['file'].partition('/')[0]} {row['version']}" for row in rows)
     counts = [f"{(table['told'] == word).sum()} {word}" for word in (RIGHT, WARNED, REFUSED)]
-    mean = np.exp(np.log(ratios["ratio"]).mean())
     return (
         f"`sgimd check` on {len(rows)} places in {table['file'].nunique()} unchanged files of {', '.join(packages)}: "
         f"{', '.join(counts)}; {right} as reading them tells ([rows](model_files.csv)). After 500 movements, at goals "
         "that postures reach if the joints alone say where the place is, or else all over T, `practice` errs "
-        f"{mean:.2f} times as much as random movements in the mean of {len(ratios)}, worse by its interval on "
-        f"{(ratios['low'] > 1).sum()}."
+        f"{page.cell(times_random_on_models, page.evidence, form='.2f')} times as much as random movements in the mean "
+        f"of {len(learnt)}, worse by its interval on {(learnt['low'] > 1).sum()}."
     )
 
 
