@@ -104,7 +104,7 @@ def paper(evidence: Evidence, *, letter: bool) -> list[Claim]:
               [part for number in (1, 2)
                for part in less(evidence, our("observation", f"-teacher-{number}"), observation,
                                 name=f"{number} and 3")],
-              "Only demonstrator 2 is better."),
+              "By eq. (9) only demonstrator 2 is better."),
         Claim("T 10⁴ times larger: the error of SAGG-RIAC is still smaller than that of Random",
               less(evidence, sagg_riac_large, random), "Nearly all goals of SAGG-RIAC are out of reach."),
         Claim("... the error of SAGG-RIAC grows more than that of SGIM-D: ratio of ratios > 1",
