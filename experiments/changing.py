@@ -3,8 +3,9 @@
     experiments/compare.py changes                                                     the lives of the page CHANGES
     experiments/compare.py changes --only toss --seeds 1000,1001 --results development    others, on one of the robots
 
-The learner is `practice`. What it learnt before may also come from a simulator: "simulator" is the arm of
-docs/how-to/sim-to-real.md, and the learner "wrong" begins with a simulator that mirrors the outcomes.
+The learner is `practice`. A seed of "random-robots" has a robot of its own, named before the first of them was run.
+What was learnt before may also come from a simulator: "simulator" is the arm of docs/how-to/sim-to-real.md, and the
+learner "wrong" begins with a simulator that mirrors the outcomes.
 """
 
 from __future__ import annotations
@@ -17,15 +18,15 @@ from functools import partial
 from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from lives import Life
+from random_robots import RandomRobot
 from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.environments.mujoco_robot import MujocoRobot
-from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.evaluation import evaluate, tile_goals, tile_side
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
@@ -40,8 +41,12 @@ BEGUN: Final = (50, *AFTER)  # movements after a simulator
 GOALS: Final = 48  # largest number of goals of an evaluation
 GRADUAL: Final = 2000  # number of movements in which a gradual change grows
 UNDONE: Final = 500  # number of movements after which a change is undone
-ROBOTS: Final = {"planar-arm-7": 1000, "fishing-rod": 500, "toss": 1000, "crawler": 1000}  # movements before a change
-CHANGES: Final = ("offset-0.1", "offset-0.02", "gain", "stuck", "mirrored", "gradual", "undone", "noise")
+RANDOM_ROBOTS: Final = "random-robots"  # those of random_robots.py; each seed has another one
+FIRST_RANDOM: Final = 450  # number of the random robot of seed 0
+# Movements before a change.
+ROBOTS: Final = {"planar-arm-7": 1000, "fishing-rod": 500, "toss": 1000, "crawler": 1000, RANDOM_ROBOTS: 1000}
+LOCAL: Final = ("offset-0.1", "offset-0.02", "gain", "stuck", "swap", "shift", "gradual", "undone")
+CHANGES: Final = (*LOCAL, "mirrored", "noise")
 GOES_ON: Final = "goes-on"  # learner that goes on after a change
 ANEW: Final = "anew"  # learner that begins after the change
 BLIND: Final = "blind"  # learner that goes on and notices no change
@@ -57,20 +62,35 @@ PAGE: Final = Path(__file__).parents[1] / "docs" / "how-to" / "sim-to-real.md"
 class Changing:
     """A robot that changes after ``at`` movements. ``made`` counts them, set by the caller."""
 
-    def __init__(self, robot: Environment, change: str, at: int) -> None:
+    def __init__(self, robot: Any, change: str, at: int) -> None:
         self.robot, self.at, self.made = robot, at, 0
         self.change, _, self.size = change.partition("-")
         self.contexts, self.policies, self.outcomes = robot.contexts, robot.policies, robot.outcomes
         self.rest, self.outcome_noise = robot.rest, robot.outcome_noise
 
-    def observe(self, rng: np.random.Generator) -> Array:
+    def observe(self, rng: np.random.Generator) -> Any:
         return self.robot.observe(rng)
 
     def execute(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Array:
-        since = self.made - self.at
-        if since < 0 or self.change == "none" or (self.change == "undone" and since >= UNDONE):
-            return self.robot.execute(context, theta, rng)
-        box, theta = self.policies, np.array(theta, dtype=np.float64)
+        outcome = self._seen(self.robot.execute(context, self._moved(theta), rng))
+        if self.change == "noise" and self._since >= 0:  # three times as large, but for robots without noise
+            sd = np.sqrt(8) * self.outcome_noise or 0.015 * self.outcomes.sides.mean()
+            outcome = outcome + rng.normal(0, sd, len(outcome))
+        return outcome
+
+    def effect(self, context: Array, theta: Array) -> Array:
+        """Outcome of a movement of a random robot, without noise."""
+        return self._seen(self.robot.effect(context, self._moved(theta)))
+
+    @property
+    def _since(self) -> int:
+        return self.made - self.at
+
+    def _moved(self, theta: ArrayLike) -> Array:
+        """The movement that is made."""
+        box, theta, since = self.policies, np.array(theta, dtype=np.float64), self._since
+        if since < 0 or (self.change == "undone" and since >= UNDONE):
+            return theta
         middle = (box.low + box.high) / 2
         match self.change:
             case "offset" | "undone":
@@ -81,15 +101,19 @@ class Changing:
                 theta = middle + 0.8 * (theta - middle)
             case "stuck":
                 theta[1] = box.low[1] + 0.7 * box.sides[1]
-            case "reversed":  # only tests use it: nothing of before helps
-                theta = box.low + (theta[::-1] - box.low[::-1]) * (box.sides / box.sides[::-1])
+            case "swap" | "reversed":  # only tests use the latter: nothing of before helps
+                order = [1, 0, *range(2, box.dim)] if self.change == "swap" else np.arange(box.dim)[::-1]
+                theta = box.low + (theta - box.low)[order] * (box.sides / box.sides[order])
             case "mirrored":
                 theta = 2 * middle - theta
-        outcome = self.robot.execute(context, box.clip(theta), rng)
-        if self.change == "mirrored":
-            outcome = outcome * np.where(np.arange(len(outcome)) == 0, -1, 1)
-        if self.change == "noise":  # three times as large, but for robots without noise
-            outcome = outcome + rng.normal(0, max(np.sqrt(8) * self.outcome_noise, 0.03), len(outcome))
+        return box.clip(theta)
+
+    def _seen(self, outcome: Array) -> Array:
+        """The outcome that is told."""
+        if self._since >= 0 and self.change == "shift":
+            return outcome + 0.04 * self.outcomes.sides
+        if self._since >= 0 and self.change == "mirrored":
+            return outcome * np.where(np.arange(len(outcome)) == 0, -1, 1)
         return outcome
 
 
@@ -97,16 +121,22 @@ def life(name: str, change: str, learner: str, seed: int) -> dict[int, tuple[flo
     """Errors by number of movements after the change, and how many changes the learner has noticed by then."""
     if change == SIMULATOR:
         return life_after_simulator(learner, seed)
-    place = TASKS[name].options["environment"] if name in TASKS else name
-    made, anew = load_word("environment", place)(), learner == ANEW
-    goals = benchmark_of(made, None)[0].goals
-    at = 0 if anew else ROBOTS[name]
-    world = Changing(made.environment, "none" if anew and change == "undone" else change, at)
-    robotic = practice(world, seed + 50 * anew)
+    at, start = (0, 0) if learner == ANEW else (ROBOTS[name], ROBOTS[name] + UNDONE * (change == "undone"))
+    robot, goals = robot_of(name, seed)
+    world = Changing(robot, "none" if learner == ANEW and change == "undone" else change, at)
+    robotic = practice(world, seed + 50 * (learner == ANEW))
     if learner == BLIND:
         robotic.watcher = None
-    start = at + UNDONE * (change == "undone" and not anew)
-    return errors(robotic, world, seed, goals[:: 1 + len(goals) // GOALS], start, after(name))
+    return errors(robotic, world, seed, goals, start, after(name))
+
+
+def robot_of(name: str, seed: int) -> tuple[Any, Array | None]:
+    """A robot, and goals of its benchmark; None: it is a random robot, which has its own."""
+    if name == RANDOM_ROBOTS:
+        return RandomRobot(FIRST_RANDOM + seed), None
+    made = load_word("environment", TASKS[name].options["environment"] if name in TASKS else name)()
+    goals = benchmark_of(made, None)[0].goals
+    return made.environment, goals[:: 1 + len(goals) // GOALS]
 
 
 def life_after_simulator(learner: str, seed: int) -> dict[int, tuple[float, int]]:
@@ -128,17 +158,23 @@ def life_after_simulator(learner: str, seed: int) -> dict[int, tuple[float, int]
 
 
 def errors(
-    learner: Learner, world: Environment, seed: int, goals: Array, start: int, counts: Collection[int]
+    learner: Learner, world: Any, seed: int, goals: Array | None, start: int, counts: Collection[int]
 ) -> dict[int, tuple[float, int]]:
-    """Mean error at the goals (unit of T), and changes noticed, by number of movements after the first ``start``."""
+    """Mean error at the goals (unit of T), and changes noticed, by number of movements after the first ``start``.
+
+    Without goals, ``world`` is a random robot that changes, and the error is relative to the spread of its goals.
+    """
     errors_at = {}
     for episode in run(learner, world, seed, movements=start + max(counts)):
         made = episode.index + 1
         if isinstance(world, Changing):
             world.made = made
         if made - start in counts:
-            evaluation = evaluate(learner.inverse, world, goals, 1, step=made, repeats=0)
-            errors_at[made - start] = evaluation.mean_error, len(learner.changes)
+            if goals is None:
+                error = world.robot.error(learner.inverse, world.effect)
+            else:
+                error = evaluate(learner.inverse, world, goals, 1, step=made, repeats=0).mean_error
+            errors_at[made - start] = error, len(learner.changes)
     return errors_at
 
 

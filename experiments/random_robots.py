@@ -146,10 +146,13 @@ class RandomRobot:
             sd *= 20
         return outcome + (rng.normal(0, sd, self._outcome_dim) if sd else 0.0)
 
-    def error(self, inverse: Inverse) -> float:
-        """Mean distance between goals and the effects of the answers, relative to the spread of the goals."""
-        asked = list(zip(self.goal_contexts, self.goals, strict=True))
-        missed = [np.linalg.norm(self.effect(c, inverse(c, g).theta) - g) for c, g in asked]
+    def error(self, inverse: Inverse, effect: Callable[[Array, Array], Array] | None = None) -> float:
+        """Mean distance between goals and the effects of the answers, relative to the spread of the goals.
+
+        ``effect`` (context, theta) -> outcome: that of a robot which has changed; None: its own.
+        """
+        asked, effect = list(zip(self.goal_contexts, self.goals, strict=True)), effect or self.effect
+        missed = [np.linalg.norm(effect(c, inverse(c, g).theta) - g) for c, g in asked]
         return float(np.mean(missed) / np.linalg.norm(self.goals - self.goals.mean(axis=0), axis=1).mean())
 
 

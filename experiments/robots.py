@@ -14,9 +14,9 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from changing import AFTER, ANEW, ARM, BEGUN, BLIND, GOES_ON, ROBOTS, SIMULATOR, WRONG, after
+from changing import AFTER, ANEW, ARM, BEGUN, BLIND, GOES_ON, LOCAL, ROBOTS, SIMULATOR, WRONG, after
 from evidence import Evidence, Level, NotRun, Statistic
-from judging import Claim, Part, at_most
+from judging import Claim, Part, at_least, at_most
 from model_files import FILES, REFUSED, RIGHT, WARNED
 from page_tables import MISSING_CELL, Page, markdown
 from random_robots import BASELINE, COUNTS, LEARNERS, RANDOM
@@ -252,6 +252,28 @@ def over_anew(
     return evidence.over(*(after_change(evidence, robot, change, name, at) for name in (learner, other)), level=level)
 
 
+def mean_over_anew(evidence: Evidence, robot: str, at: int, *, level: Level = LEVEL) -> Interval:
+    """The geometric mean of `over_anew` over changes after which much of before holds; the sample is the seeds."""
+    logs = [
+        np.log(after_change(evidence, robot, change, GOES_ON, at) / after_change(evidence, robot, change, ANEW, at))
+        for change in LOCAL
+    ]
+    return geometric_mean(np.exp(pd.concat(logs, axis=1).mean(axis=1)), level=level)
+
+
+def noticed(evidence: Evidence, *, level: Level = LEVEL) -> Interval:
+    """The share of lives with such a change that have noticed it at their end.
+
+    Raises:
+        NotRun: some were not run.
+    """
+    numbers = []
+    for robot, change in product(ROBOTS, LOCAL):
+        after_change(evidence, robot, change, GOES_ON, at := after(robot)[-1])
+        numbers.append(evidence.changes.loc[(robot, change, GOES_ON, at), "noticed"])
+    return share(pd.concat(numbers) > 0, level=level)
+
+
 def changes(evidence: Evidence) -> list[Claim]:
     """Claims about `practice` on robots that change, and about beginning with a simulator."""
 
@@ -271,7 +293,12 @@ def changes(evidence: Evidence) -> list[Claim]:
               parts(0.5, *shifts, "undone", times=(100, 250))),
         Claim("Never worse than anew at 100 to 1000: ratios ≤ 1.05: offset, gain, gradual",
               parts(1.05, *shifts, "gradual")),
-        *(Claim(f"... {change}", parts(1.05, change)) for change in ("stuck", "undone", "mirrored")),
+        *(Claim(f"... {change}", parts(1.05, change)) for change in ("stuck", "swap", "shift", "undone", "mirrored")),
+        Claim("The mean of all but mirrored and noise, at 100 to 1000: ratios ≤ 1.10",
+              [at_most(1.1, mean_over_anew, evidence, robot, at, name=f"{robot}, {at}")
+               for robot in ROBOTS for at in after(robot)]),
+        Claim("These changes are noticed: ≥ 0.95 of lives",
+              [at_least(0.95, noticed, evidence)]),
         Claim("Noise: nor than a learner that notices nothing: ratios ≤ 1.05",
               parts(1.05, "noise", other=BLIND)),
         Claim("Simulator: half the error at 50, 100: ratios ≤ 0.50", begun(0.5, GOES_ON, *BEGUN[:2])),

@@ -129,3 +129,14 @@ def by_halves(era: Era, policies: Box, current: Exemplars) -> Array:
         calibration, tested = Calibration(era, policies).fit(current.some(~half_tested)), current.some(half_tested)
         errors[half_tested] = squared(calibration.predict(tested) - tested.outcomes)
     return errors
+
+
+def shifted_by_halves(differences: Array) -> Array:
+    """Squared errors ``(n,)`` of predictions that are shifted by the median difference of the other half.
+
+    Two halves tell a shift of all outcomes where they are too few, or too noisy, for a calibration.
+    """
+    errors, is_even = np.empty(len(differences)), np.arange(len(differences)) % 2 == 0
+    for half_tested in (is_even, ~is_even):
+        errors[half_tested] = squared(differences[half_tested] - np.median(differences[~half_tested], axis=0))
+    return errors

@@ -3,9 +3,10 @@
 An era is a part of a life in which the robot stays the same.
 
 Each movement is predicted before its outcome is remembered. A CUSUM on surprises beyond the usual ones (Page 1954) says
-since when predictions fail. Then it is tested whether the movements since then predict each other better, or whether a
-calibration of what was known predicts them better: noise alone does neither. Everything follows from the exemplars and
-their order, so a replay notices the same.
+since when predictions fail. A small or slow change surprises at no single movement, but gives the last residuals a
+common direction. Then it is tested what predicts the last movements better: each other, or what was known, calibrated
+or shifted. Noise alone makes none of these better. Everything follows from the exemplars and their order, so a replay
+notices the same.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from sgimd_torch.changes.calibration import Calibration, by_halves
+from sgimd_torch.changes.calibration import Calibration, by_halves, shifted_by_halves
 from sgimd_torch.changes.eras import NEAR, SURE, Era, Exemplars, better, gains_over, squared
 from sgimd_torch.inverses.gaussian_process import one_thread
 from sgimd_torch.inverses.local_process import LocalProcess, predictions
@@ -32,6 +33,9 @@ _PREDICTED: Final = 30  # least number of predictions in an era before a change 
 _TESTED_AFTER: Final = (16, 24, 36, 54, 81, 122, 182, 273)
 _EVERY: Final = 64  # number of movements between two tests without a suspicion
 _SLOW: Final = 128  # number of last movements that such a test compares
+_LEANING: Final = (32, 64, _SLOW)  # numbers of last residuals whose sums are compared
+_LARGEST_RESIDUAL: Final = 3.0  # bound of a residual in such a sum, in standard deviations
+_LEANS: Final = 4.0  # sum of residuals, self-normalised, from which on they lean; 3.7 at most where nothing changed
 _FAILED: Final = 6.0  # squared error, relative to the expected one, above which a prediction has failed
 _TESTED: Final = 128  # largest number of newest movements that are tested
 _ERAS: Final = 3  # largest number of earlier eras that are kept
@@ -40,6 +44,7 @@ _GROWTH: Final = 2  # factor of the length of an era from one comparison with ea
 _FIRST_REVIEW: Final = 8  # number of movements at the first such comparison with a prior
 _ALONE: Final = 24  # least number of movements that get lengths and kernel of their own
 _CALIBRATED: Final = 12  # least number of movements that calibrate an earlier era
+_HELPS: Final = 2.0  # statistic T from which on earlier exemplars are kept
 
 
 class Restart(NamedTuple):
@@ -84,6 +89,7 @@ class ChangeDetector:
     def _reset_suspicion(self) -> None:
         self._surprises: list[float] = []
         self._errors: list[float] = []
+        self._residuals: list[Array] = []  # in standard deviations
         self._cusum, self._suspected_at, self._last_quiet, self._n_tests = 0.0, -1, 0, 0
 
     def expect(self, process: LocalProcess, context: Array, theta: Array, outcome: Array) -> None:
@@ -96,6 +102,7 @@ class ChangeDetector:
         predicted = predictions(fitted.inputs, process.memory.outcomes, near, point, fitted.kernel)
         expected, (variance,), (noise,), _ = predicted
         self._errors.append(float(squared(expected[0] - outcome)))
+        self._residuals.append((outcome - expected[0]) / np.sqrt(variance + noise + 1e-300))
         surprise = self._errors[-1] / (len(outcome) * float(variance + noise) + 1e-300)
         self._surprises = [*self._surprises[-_RECENT:], surprise]
         if len(process.memory) >= _FIRST and len(self._surprises) >= _PREDICTED:
@@ -140,7 +147,8 @@ class ChangeDetector:
         return 0
 
     def _drifted(self, process: LocalProcess, n: int) -> int:
-        """Without a suspicion, how many of the last movements predict each other better than they were predicted."""
+        """How many of the last movements to test without a suspicion: they predict each other better than they were
+        predicted, or they were predicted with errors of a common direction."""
         n_last, fitted = _SLOW, process.fitted()
         if n - self._compared < _EVERY or fitted is None:
             return 0
@@ -149,7 +157,9 @@ class ChangeDetector:
             return 0
         recent = Era(fitted, Exemplars.of(process.memory, slice(-n_last, None)))
         errors, _ = recent.left_out(np.arange(n_last))
-        return n_last if better(np.array(self._errors[-n_last:]), errors, self.noise) >= SURE else 0
+        if better(np.array(self._errors[-n_last:]), errors, self.noise) >= SURE or _lean(self._residuals):
+            return n_last
+        return 0
 
     @one_thread
     def _changed(self, process: LocalProcess, n_last: int) -> int:
@@ -164,7 +174,8 @@ class ChangeDetector:
         # If nothing had changed, both would predict; the first errs more where noise has grown.
         unchanged = Era(fitted, Exemplars.of(memory)).left_out(rows)[0], as_it_was
         of_each_other, _ = Era(fitted, tested).left_out(np.arange(len(rows)))
-        for errors in (of_each_other, by_halves(earlier, self.problem.policies, tested)):
+        calibrated = by_halves(earlier, self.problem.policies, tested)
+        for errors in (of_each_other, calibrated, shifted_by_halves(tested.outcomes - expected)):
             for some in (slice(None), as_it_was > failed):  # a local change is seen in those that failed
                 if all(better(of_one[some], errors[some], self.noise) >= SURE for of_one in unchanged):
                     # The suspicion may have begun too early: the first movements then fit the old era better.
@@ -192,8 +203,8 @@ class ChangeDetector:
             self._eras = [*(era for era in self._eras if era is not chosen), chosen]
             helpful, n_before = self._helpful(chosen, calibrated, current, tested_rows), len(chosen.exemplars.thetas)
             together, _ = self._process(helpful.and_then(current), chosen).left_out(len(helpful.thetas) + tested_rows)
-            kept = helpful if gains_over(alone, together, self.noise).mean() >= 0 else kept
-        self._review, self._errors = _GROWTH * n if len(kept.thetas) else 0, []
+            kept = helpful if better(alone, together, self.noise) >= _HELPS else kept
+        self._review, self._errors, self._residuals = _GROWTH * n if len(kept.thetas) else 0, [], []
         if is_new:
             self._reset_suspicion()
         return Restart(kept.and_then(current), len(kept.thetas), n_before, is_new)
@@ -220,6 +231,15 @@ class ChangeDetector:
         variances_alone = alone.predict(before)[1] * alone.inflation(tested_rows)
         corrected = before._replace(outcomes=before.outcomes + correction)
         return corrected.some(variances * of_unexplained.inflation(tested_rows) < _SURER * variances_alone)
+
+
+def _lean(residuals: list[Array]) -> bool:
+    """Whether the last residuals have a common direction in some dimension of the outcome."""
+    for n_last in _LEANING:
+        last = np.clip(residuals[-n_last:], -_LARGEST_RESIDUAL, _LARGEST_RESIDUAL)
+        if (np.abs(last.sum(axis=0)) > _LEANS * np.sqrt(np.square(last).sum(axis=0))).any():
+            return True
+    return False
 
 
 def _fourth_fifth(values: list[float]) -> float:

@@ -121,6 +121,14 @@ def test_noise_alone_is_no_change():
     assert learner.changes == []
 
 
+def test_a_shift_below_the_noise_is_noticed_as_residuals_have_a_common_direction():
+    robot = Changing(PlanarArm(3, noise=0.12), "shift", 520)  # by .08
+    learner = practice(robot, 4)
+    live(learner, robot, 640)
+    (change,) = learner.changes
+    assert 510 <= change.since <= 530
+
+
 @pytest.mark.parametrize("name", LIVES)
 def test_competence_falls_again_where_nothing_is_reached_any_more(name):
     robot = Changing(ARM, "reversed", 200)

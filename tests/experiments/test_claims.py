@@ -110,12 +110,16 @@ ROBOTS = {
     ("changes", 0): lambda *key: 1.5 if key == ("fishing-rod", "undone", "goes-on", 250) else 1,
     ("changes", 1): lambda *key: 3 if key == ("toss", "gradual", "goes-on", 500) else 1,
     ("changes", 2): lambda *key: 3 if key == ("crawler", "stuck", "goes-on", 1000) else 1,
-    ("changes", 3): lambda *key: 3 if key == ("crawler", "undone", "goes-on", 1000) else 1,
-    ("changes", 4): lambda *key: 3 if key == ("planar-arm-7", "mirrored", "goes-on", 100) else 1,
-    ("changes", 5): lambda *key: 0.3 if key == ("toss", "noise", "blind", 100) else 1,
-    ("changes", 6): lambda *key: 1.5 if key == (ARM, SIMULATOR, "goes-on", 50) else 1,
-    ("changes", 7): lambda *key: 3 if key == (ARM, SIMULATOR, "goes-on", 1000) else 1,
-    ("changes", 8): lambda *key: 3 if key == (ARM, SIMULATOR, "wrong", 1000) else 1,
+    ("changes", 3): lambda *key: 3 if key == ("crawler", "swap", "goes-on", 500) else 1,
+    ("changes", 4): lambda *key: 3 if key == ("random-robots", "shift", "goes-on", 1000) else 1,
+    ("changes", 5): lambda *key: 3 if key == ("crawler", "undone", "goes-on", 1000) else 1,
+    ("changes", 6): lambda *key: 3 if key == ("planar-arm-7", "mirrored", "goes-on", 100) else 1,
+    ("changes", 7): lambda *key: 3 if key[0] == "toss" and key[2:] == ("goes-on", 250) else 1,
+    ("changes", 8): lambda *key: 0 if key[1:3] == ("gradual", "noticed") else 1,
+    ("changes", 9): lambda *key: 0.3 if key == ("toss", "noise", "blind", 100) else 1,
+    ("changes", 10): lambda *key: 1.5 if key == (ARM, SIMULATOR, "goes-on", 50) else 1,
+    ("changes", 11): lambda *key: 3 if key == (ARM, SIMULATOR, "goes-on", 1000) else 1,
+    ("changes", 12): lambda *key: 3 if key == (ARM, SIMULATOR, "wrong", 1000) else 1,
 }
 CASES += [(page, claim, {"robots": change}) for (page, claim), change in ROBOTS.items()]
 

@@ -9,7 +9,7 @@ import pytest
 
 import random_robots
 import robots
-from changing import GRADUAL, UNDONE, Changing, errors
+from changing import FIRST_RANDOM, GRADUAL, UNDONE, Changing, errors, robot_of
 from evidence import Evidence, NotRun
 from lives import Life, collect
 from made_lives import write_lives
@@ -46,6 +46,26 @@ def test_an_offset_shifts_every_parameter_from_its_movement_on(change, since, sh
     box = PlanarArm().policies
     theta = box.low + 0.4 * box.sides
     np.testing.assert_allclose((moved(change, since, theta)[0] - theta) / box.sides, shift, atol=1e-12)
+
+
+def test_swapped_parameters_change_places_in_their_ranges_and_shifted_outcomes_are_told_elsewhere():
+    box, unit = PlanarArm().policies, np.linspace(0.1, 0.9, PlanarArm().policies.dim)
+    theta, outcome = moved("swap", 0, box.low + unit * box.sides)
+    np.testing.assert_allclose((theta - box.low) / box.sides, [unit[1], unit[0], *unit[2:]])
+    np.testing.assert_array_equal(outcome, [1, 1])
+    theta, outcome = moved("shift", 0, box.low + unit * box.sides)
+    np.testing.assert_allclose((theta - box.low) / box.sides, unit)
+    np.testing.assert_allclose(outcome, 1 + 0.04 * PlanarArm().outcomes.sides)
+
+
+def test_a_random_robot_that_changes_is_evaluated_at_its_own_goals_without_noise():
+    robot, goals = robot_of("random-robots", 3)
+    changed = Changing(robot, "shift", at=0)
+    assert goals is None
+    assert robot.family == kind(FIRST_RANDOM + 3)[0]
+    learner = practice(changed, 0)
+    ((_, (error, _)),) = errors(learner, changed, 0, goals, 0, (20,)).items()
+    assert error == robot.error(learner.inverse, lambda c, theta: robot.effect(c, theta) + 0.04 * robot.outcomes.sides)
 
 
 def test_a_mirrored_robot_turns_movements_and_the_first_outcome_around():

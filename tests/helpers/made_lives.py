@@ -10,6 +10,7 @@ from table import TABLES, merge
 def write_lives(folder, factor=lambda *key: 1.0, robots=60, seeds=8):
     """Tables in which every claim is true; ``factor`` (columns of the key) -> factor of an error.
 
+    Each change is noticed; the factor of a learner "noticed" multiplies that number.
     Two model files: `practice` errs .8 times as much as random movements on one, the other is refused.
     """
     from changing import AFTER, ARM, BEGUN, CHANGES, ROBOTS, SIMULATOR, after, learners
@@ -29,7 +30,8 @@ def write_lives(folder, factor=lambda *key: 1.0, robots=60, seeds=8):
             for at in times:
                 for seed in range(seeds):
                     error = {"goes-on": goes_on[at], "wrong": 0.9}.get(learner, 1.0) * np.exp(0.01 * (seed % 3))
-                    rows.append((robot, change, learner, seed, at, error * factor(robot, change, learner, at), 0))
+                    noticed = int(factor(robot, change, "noticed", at))
+                    rows.append((robot, change, learner, seed, at, error * factor(robot, change, learner, at), noticed))
     merge(folder, "changes.csv", [dict(zip(TABLES["changes.csv"][1], row, strict=False)) for row in rows])
     rows = [
         ("dm_control/arm.xml", "site:tip", "", "1.0", "right", "", 0.4, 0.5, 0.8, 0.7, 0.9),
