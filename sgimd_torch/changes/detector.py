@@ -11,6 +11,7 @@ notices the same.
 
 from __future__ import annotations
 
+from collections import deque
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -88,9 +89,12 @@ class ChangeDetector:
 
     def _reset_suspicion(self) -> None:
         self._surprises: list[float] = []
-        self._errors: list[float] = []
-        self._residuals: list[Array] = []  # in standard deviations
+        self._forget_errors()
         self._cusum, self._suspected_at, self._last_quiet, self._n_tests = 0.0, -1, 0, 0
+
+    def _forget_errors(self) -> None:
+        self._errors: deque[float] = deque(maxlen=_SLOW)
+        self._residuals: deque[Array] = deque(maxlen=_SLOW)  # in standard deviations
 
     def expect(self, process: LocalProcess, context: Array, theta: Array, outcome: Array) -> None:
         """Predict a movement that is not in memory yet, and compare."""
@@ -157,9 +161,8 @@ class ChangeDetector:
             return 0
         recent = Era(fitted, Exemplars.of(process.memory, slice(-n_last, None)))
         errors, _ = recent.left_out(np.arange(n_last))
-        if better(np.array(self._errors[-n_last:]), errors, self.noise) >= SURE or _lean(self._residuals):
-            return n_last
-        return 0
+        are_better = better(np.array(self._errors), errors, self.noise) >= SURE
+        return n_last if are_better or _lean(np.array(self._residuals)) else 0
 
     @one_thread
     def _changed(self, process: LocalProcess, n_last: int) -> int:
@@ -204,7 +207,8 @@ class ChangeDetector:
             helpful, n_before = self._helpful(chosen, calibrated, current, tested_rows), len(chosen.exemplars.thetas)
             together, _ = self._process(helpful.and_then(current), chosen).left_out(len(helpful.thetas) + tested_rows)
             kept = helpful if better(alone, together, self.noise) >= _HELPS else kept
-        self._review, self._errors, self._residuals = _GROWTH * n if len(kept.thetas) else 0, [], []
+        self._review = _GROWTH * n if len(kept.thetas) else 0
+        self._forget_errors()
         if is_new:
             self._reset_suspicion()
         return Restart(kept.and_then(current), len(kept.thetas), n_before, is_new)
@@ -233,13 +237,11 @@ class ChangeDetector:
         return corrected.some(variances * of_unexplained.inflation(tested_rows) < _SURER * variances_alone)
 
 
-def _lean(residuals: list[Array]) -> bool:
-    """Whether the last residuals have a common direction in some dimension of the outcome."""
-    for n_last in _LEANING:
-        last = np.clip(residuals[-n_last:], -_LARGEST_RESIDUAL, _LARGEST_RESIDUAL)
-        if (np.abs(last.sum(axis=0)) > _LEANS * np.sqrt(np.square(last).sum(axis=0))).any():
-            return True
-    return False
+def _lean(residuals: Array) -> bool:
+    """Whether the last residuals ``(n, outcome_dim)`` have a common direction in some dimension of the outcome."""
+    bounded = np.clip(residuals, -_LARGEST_RESIDUAL, _LARGEST_RESIDUAL)
+    lasts = [bounded[-n_last:] for n_last in _LEANING]
+    return any((np.abs(last.sum(axis=0)) > _LEANS * np.sqrt(squared(last.T))).any() for last in lasts)
 
 
 def _fourth_fifth(values: list[float]) -> float:
