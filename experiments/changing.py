@@ -3,7 +3,7 @@
     experiments/compare.py changes                                                     the lives of the page CHANGES
     experiments/compare.py changes --only toss --seeds 1000,1001 --results development    others, on one of the robots
 
-The learner is `practice`. A seed of "random-robots" has a robot of its own, named before the first of them was run.
+The learner is `practice`. On "random-robots", each seed has another robot; those of the page are 710 to 719.
 What was learnt before may also come from a simulator: "simulator" is the arm of docs/how-to/sim-to-real.md, and the
 learner "wrong" begins with a simulator that mirrors the outcomes.
 """
@@ -45,8 +45,9 @@ RANDOM_ROBOTS: Final = "random-robots"  # those of random_robots.py; each seed h
 FIRST_RANDOM: Final = 450  # number of the random robot of seed 0
 # Movements before a change.
 ROBOTS: Final = {"planar-arm-7": 1000, "fishing-rod": 500, "toss": 1000, "crawler": 1000, RANDOM_ROBOTS: 1000}
-LOCAL: Final = ("offset-0.1", "offset-0.02", "gain", "stuck", "swap", "shift", "gradual", "undone")
-CHANGES: Final = (*LOCAL, "mirrored", "noise")
+# Changes after which much of what was learnt still holds, in some way.
+PARTIAL: Final = ("offset-0.1", "offset-0.02", "gain", "stuck", "swap", "shift", "gradual", "undone")
+CHANGES: Final = (*PARTIAL, "mirrored", "noise")
 GOES_ON: Final = "goes-on"  # learner that goes on after a change
 ANEW: Final = "anew"  # learner that begins after the change
 BLIND: Final = "blind"  # learner that goes on and notices no change

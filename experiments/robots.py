@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from changing import AFTER, ANEW, ARM, BEGUN, BLIND, GOES_ON, LOCAL, ROBOTS, SIMULATOR, WRONG, after
+from changing import AFTER, ANEW, ARM, BEGUN, BLIND, GOES_ON, PARTIAL, ROBOTS, SIMULATOR, WRONG, after
 from evidence import Evidence, Level, NotRun, Statistic
 from judging import Claim, Part, at_least, at_most
 from model_files import FILES, REFUSED, RIGHT, WARNED
@@ -177,16 +177,18 @@ def alarms(page: Page) -> str:
     return f"{(last['noticed'] > 0).sum()} of {len(last)}"
 
 
-def after_change(evidence: Evidence, robot: str, change: str, learner: str, at: int) -> pd.Series:
-    """Errors by seed, ``at`` movements after a change.
+def after_change(
+    evidence: Evidence, robot: str, change: str, learner: str, at: int, column: str = "error"
+) -> pd.Series:
+    """Errors, or another column, by seed, ``at`` movements after a change.
 
     Raises:
         NotRun: fewer than two seeds were run.
     """
     place = (robot, change, learner, at)
-    if place not in evidence.changes.index or len(errors := evidence.changes.loc[place, "error"]) < 2:
+    if place not in evidence.changes.index or len(values := evidence.changes.loc[place, column]) < 2:
         raise NotRun(f"{learner} after {change} of {robot} at {at}")
-    return errors
+    return values
 
 
 def learnt_models(evidence: Evidence) -> pd.DataFrame:
@@ -253,24 +255,20 @@ def over_anew(
 
 
 def mean_over_anew(evidence: Evidence, robot: str, at: int, *, level: Level = LEVEL) -> Interval:
-    """The geometric mean of `over_anew` over changes after which much of before holds; the sample is the seeds."""
-    logs = [
-        np.log(after_change(evidence, robot, change, GOES_ON, at) / after_change(evidence, robot, change, ANEW, at))
-        for change in LOCAL
+    """The geometric mean of the error over that of starting anew, over partial changes; the sample is the seeds."""
+    ratios = [
+        after_change(evidence, robot, change, GOES_ON, at) / after_change(evidence, robot, change, ANEW, at)
+        for change in PARTIAL
     ]
-    return geometric_mean(np.exp(pd.concat(logs, axis=1).mean(axis=1)), level=level)
+    return geometric_mean(np.exp(np.log(pd.concat(ratios, axis=1).dropna()).mean(axis=1)), level=level)
 
 
 def noticed(evidence: Evidence, *robots: str, level: Level = LEVEL) -> Interval:
-    """The share of lives with such a change that have noticed it at their end.
-
-    Raises:
-        NotRun: some were not run.
-    """
-    numbers = []
-    for robot, change in product(robots, LOCAL):
-        after_change(evidence, robot, change, GOES_ON, at := after(robot)[-1])
-        numbers.append(evidence.changes.loc[(robot, change, GOES_ON, at), "noticed"])
+    """The share of lives with a partial change that have noticed it at their end."""
+    numbers = [
+        after_change(evidence, robot, change, GOES_ON, after(robot)[-1], "noticed")
+        for robot, change in product(robots, PARTIAL)
+    ]
     return share(pd.concat(numbers) > 0, level=level)
 
 
@@ -311,7 +309,7 @@ def changes(evidence: Evidence) -> list[Claim]:
                for robot in ROBOTS for at in after(robot)]),
         Claim("These changes are noticed: ≥ 0.95 of lives",
               [at_least(0.95, noticed, evidence, *ROBOTS)]),
-        Claim("Noise: nor than a learner that notices nothing: ratios ≤ 1.05",
+        Claim("Noise: never worse than a learner that notices nothing: ratios ≤ 1.05",
               parts(1.05, "noise", other=BLIND)),
         Claim("Simulator: half the error at 50, 100: ratios ≤ 0.50", begun(0.5, GOES_ON, *BEGUN[:2])),
         Claim("... never worse: ratios ≤ 1.03", begun(1.03, GOES_ON, *BEGUN)),

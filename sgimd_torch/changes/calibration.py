@@ -136,7 +136,5 @@ def shifted_by_halves(differences: Array) -> Array:
 
     Two halves tell a shift of all outcomes where they are too few, or too noisy, for a calibration.
     """
-    errors, is_even = np.empty(len(differences)), np.arange(len(differences)) % 2 == 0
-    for half_tested in (is_even, ~is_even):
-        errors[half_tested] = squared(differences[half_tested] - np.median(differences[~half_tested], axis=0))
-    return errors
+    shifts = np.array([np.median(differences[k::2], axis=0) for k in (1, 0)])
+    return squared(differences - shifts[np.arange(len(differences)) % 2])

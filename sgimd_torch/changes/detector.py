@@ -3,10 +3,9 @@
 An era is a part of a life in which the robot stays the same.
 
 Each movement is predicted before its outcome is remembered. A CUSUM on surprises beyond the usual ones (Page 1954) says
-since when predictions fail. A small or slow change surprises at no single movement, but gives the last residuals a
-common direction. Then it is tested what predicts the last movements better: each other, or what was known, calibrated
-or shifted. Noise alone makes none of these better. Everything follows from the exemplars and their order, so a replay
-notices the same.
+since when predictions fail. A small or slow change makes no single prediction fail, but biases the last ones. Then it
+is tested what predicts the last movements better: each other, or what was known, calibrated or shifted. Noise alone
+makes none of these better. Everything follows from the exemplars and their order, so a replay notices the same.
 """
 
 from __future__ import annotations
@@ -34,9 +33,9 @@ _PREDICTED: Final = 30  # least number of predictions in an era before a change 
 _TESTED_AFTER: Final = (16, 24, 36, 54, 81, 122, 182, 273)
 _EVERY: Final = 64  # number of movements between two tests without a suspicion
 _SLOW: Final = 128  # number of last movements that such a test compares
-_LEANING: Final = (32, 64, _SLOW)  # numbers of last residuals whose sums are compared
-_LARGEST_RESIDUAL: Final = 3.0  # bound of a residual in such a sum, in standard deviations
-_LEANS: Final = 4.0  # sum of residuals, self-normalised, from which on they lean; 3.7 at most where nothing changed
+_BIAS_OF: Final = (32, 64, _SLOW)  # numbers of last residuals that are tested for bias
+_LARGEST_RESIDUAL: Final = 3.0  # bound of a residual in this test, in standard deviations
+_BIASED: Final = 4.0  # self-normalised sum from which on residuals are biased; 3.7 at most where nothing changed
 _FAILED: Final = 6.0  # squared error, relative to the expected one, above which a prediction has failed
 _TESTED: Final = 128  # largest number of newest movements that are tested
 _ERAS: Final = 3  # largest number of earlier eras that are kept
@@ -151,8 +150,8 @@ class ChangeDetector:
         return 0
 
     def _drifted(self, process: LocalProcess, n: int) -> int:
-        """How many of the last movements to test without a suspicion: they predict each other better than they were
-        predicted, or they were predicted with errors of a common direction."""
+        """How many of the last movements to test without a suspicion: all if they predict each other better than they
+        were predicted, or if their predictions are biased; else 0."""
         n_last, fitted = _SLOW, process.fitted()
         if n - self._compared < _EVERY or fitted is None:
             return 0
@@ -162,7 +161,7 @@ class ChangeDetector:
         recent = Era(fitted, Exemplars.of(process.memory, slice(-n_last, None)))
         errors, _ = recent.left_out(np.arange(n_last))
         are_better = better(np.array(self._errors), errors, self.noise) >= SURE
-        return n_last if are_better or _lean(np.array(self._residuals)) else 0
+        return n_last if are_better or _biased(np.array(self._residuals)) else 0
 
     @one_thread
     def _changed(self, process: LocalProcess, n_last: int) -> int:
@@ -237,11 +236,11 @@ class ChangeDetector:
         return corrected.some(variances * of_unexplained.inflation(tested_rows) < _SURER * variances_alone)
 
 
-def _lean(residuals: Array) -> bool:
-    """Whether the last residuals ``(n, outcome_dim)`` have a common direction in some dimension of the outcome."""
+def _biased(residuals: Array) -> bool:
+    """Whether the last residuals ``(n, outcome_dim)`` clearly have a mean other than zero in some dimension."""
     bounded = np.clip(residuals, -_LARGEST_RESIDUAL, _LARGEST_RESIDUAL)
-    lasts = [bounded[-n_last:] for n_last in _LEANING]
-    return any((np.abs(last.sum(axis=0)) > _LEANS * np.sqrt(squared(last.T))).any() for last in lasts)
+    lasts = [bounded[-n_last:] for n_last in _BIAS_OF]
+    return any((np.abs(last.sum(axis=0)) > _BIASED * np.sqrt(squared(last.T))).any() for last in lasts)
 
 
 def _fourth_fifth(values: list[float]) -> float:

@@ -121,7 +121,7 @@ def test_noise_alone_is_no_change():
     assert learner.changes == []
 
 
-def test_a_shift_below_the_noise_is_noticed_as_residuals_have_a_common_direction():
+def test_a_shift_below_the_noise_is_noticed_as_it_biases_predictions():
     robot = Changing(PlanarArm(3, noise=0.12), "shift", 520)  # by .08
     learner = practice(robot, 4)
     live(learner, robot, 640)

@@ -10,7 +10,7 @@ from table import TABLES, merge
 def write_lives(folder, factor=lambda *key: 1.0, robots=60, seeds=8):
     """Tables in which every claim is true; ``factor`` (columns of the key) -> factor of an error.
 
-    Each change is noticed; the factor of a learner "noticed" multiplies that number.
+    Each change is noticed; ``factor`` (robot, change, "noticed", movements) is the number of changes noticed.
     Two model files: `practice` errs .8 times as much as random movements on one, the other is refused.
     """
     from changing import AFTER, ARM, BEGUN, CHANGES, ROBOTS, SIMULATOR, after, learners
