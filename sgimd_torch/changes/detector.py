@@ -3,14 +3,13 @@
 An era is a part of a life in which the robot stays the same.
 
 Each movement is predicted before its outcome is remembered. A CUSUM on surprises beyond the usual ones (Page 1954) says
-since when predictions fail. A small or slow change makes no single prediction fail, but biases the last ones. Then it
-is tested what predicts the last movements better: each other, or what was known, calibrated or shifted. Noise alone
-makes none of these better. Everything follows from the exemplars and their order, so a replay notices the same.
+since when predictions fail. A small or slow change makes no single prediction fail, so the last movements are also
+tested at intervals. The test is what predicts them better: each other, or what was known, calibrated or shifted. Noise
+alone makes none of these better. Everything follows from the exemplars and their order, so a replay notices the same.
 """
 
 from __future__ import annotations
 
-from collections import deque
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -32,12 +31,10 @@ _PREDICTED: Final = 30  # least number of predictions in an era before a change 
 # Numbers of movements since a suspicion at which it is tested.
 _TESTED_AFTER: Final = (16, 24, 36, 54, 81, 122, 182, 273)
 _EVERY: Final = 64  # number of movements between two tests without a suspicion
-_SLOW: Final = 128  # number of last movements that such a test compares
-_BIAS_OF: Final = (32, 64, _SLOW)  # numbers of last residuals that are tested for bias
-_LARGEST_RESIDUAL: Final = 3.0  # bound of a residual in this test, in standard deviations
-_BIASED: Final = 4.0  # self-normalised sum from which on residuals are biased; 3.7 at most where nothing changed
+_SURE_OF_MANY: Final = 2.5  # statistic T from which on such a test is passed; 1.5 at most where nothing had changed
 _FAILED: Final = 6.0  # squared error, relative to the expected one, above which a prediction has failed
 _TESTED: Final = 128  # largest number of newest movements that are tested
+_KNOWN: Final = 4 * _TESTED  # least number of exemplars before a test without a suspicion
 _ERAS: Final = 3  # largest number of earlier eras that are kept
 _SURER: Final = 0.5  # largest variance of the outcome of an earlier exemplar now, relative to its variance without it
 _GROWTH: Final = 2  # factor of the length of an era from one comparison with earlier eras to the next
@@ -77,7 +74,7 @@ class ChangeDetector:
 
     def __init__(self, problem: Problem, life: Memory, prior: Memory | None) -> None:
         self.problem, self.life, self.noise = problem, life, problem.outcome_noise
-        self.since = self._compared = 0
+        self.since = self._tested_at = 0
         self._eras: list[Era] = []  # earlier ones; the one that helped last comes last
         self._review = 0  # length of the era at which to compare it with earlier eras again, 0: never
         self._reset_suspicion()
@@ -88,12 +85,7 @@ class ChangeDetector:
 
     def _reset_suspicion(self) -> None:
         self._surprises: list[float] = []
-        self._forget_errors()
         self._cusum, self._suspected_at, self._last_quiet, self._n_tests = 0.0, -1, 0, 0
-
-    def _forget_errors(self) -> None:
-        self._errors: deque[float] = deque(maxlen=_SLOW)
-        self._residuals: deque[Array] = deque(maxlen=_SLOW)  # in standard deviations
 
     def expect(self, process: LocalProcess, context: Array, theta: Array, outcome: Array) -> None:
         """Predict a movement that is not in memory yet, and compare."""
@@ -104,9 +96,7 @@ class ChangeDetector:
         near = fitted.inputs.nearest(point, NEAR)
         predicted = predictions(fitted.inputs, process.memory.outcomes, near, point, fitted.kernel)
         expected, (variance,), (noise,), _ = predicted
-        self._errors.append(float(squared(expected[0] - outcome)))
-        self._residuals.append((outcome - expected[0]) / np.sqrt(variance + noise + 1e-300))
-        surprise = self._errors[-1] / (len(outcome) * float(variance + noise) + 1e-300)
+        surprise = float(squared(expected[0] - outcome)) / (len(outcome) * float(variance + noise) + 1e-300)
         self._surprises = [*self._surprises[-_RECENT:], surprise]
         if len(process.memory) >= _FIRST and len(self._surprises) >= _PREDICTED:
             self._accumulate(len(self.life) + 1)
@@ -116,8 +106,8 @@ class ChangeDetector:
         n = len(self.life)
         if self._suspected_at < 0 and self._review and n - self.since >= self._review:
             return self._restart(is_new=False)
-        n_last = self._suspected(process, n)
-        if n_last and (n_last := self._changed(process, n_last)):
+        n_last, sure = self._to_test(n, len(process.memory))
+        if n_last and (n_last := self._changed(process, n_last, sure)):
             fitted, before = process.fitted(), Exemplars.of(process.memory, slice(len(process.memory) - n_last))
             assert fitted is not None
             self._eras, self.since = [*self._eras, Era(fitted, before)][-_ERAS:], n - n_last
@@ -136,35 +126,23 @@ class ChangeDetector:
                 self._suspected_at, self._n_tests = self._last_quiet, 0
                 self._usual = _fourth_fifth(self._surprises[: self._last_quiet - n] or self._surprises)
 
-    def _suspected(self, process: LocalProcess, n: int) -> int:
-        """How many of the last movements to test now."""
+    def _to_test(self, n: int, n_known: int) -> tuple[int, float]:
+        """How many of the last movements to test now, and from which statistic T on they are of another era."""
         if self._suspected_at < 0:
-            return self._drifted(process, n)
+            is_due = n_known >= _KNOWN and n - self.since >= _TESTED and n - self._tested_at >= _EVERY
+            self._tested_at = n if is_due else self._tested_at
+            return _TESTED if is_due else 0, _SURE_OF_MANY
         n_since = n - self._suspected_at
         due = sum(n_since >= moment for moment in _TESTED_AFTER)
         if due > self._n_tests:
             self._n_tests = due
-            return n_since
+            return n_since, SURE
         if self._cusum == 0 or n_since > _TESTED_AFTER[-1]:
             self._reset_suspicion()
-        return 0
-
-    def _drifted(self, process: LocalProcess, n: int) -> int:
-        """How many of the last movements to test without a suspicion: all if they predict each other better than they
-        were predicted, or if their predictions are biased; else 0."""
-        n_last, fitted = _SLOW, process.fitted()
-        if n - self._compared < _EVERY or fitted is None:
-            return 0
-        self._compared = n
-        if len(self._errors) < n_last or len(process.memory) < 4 * n_last:
-            return 0
-        recent = Era(fitted, Exemplars.of(process.memory, slice(-n_last, None)))
-        errors, _ = recent.left_out(np.arange(n_last))
-        are_better = better(np.array(self._errors), errors, self.noise) >= SURE
-        return n_last if are_better or _biased(np.array(self._residuals)) else 0
+        return 0, SURE
 
     @one_thread
-    def _changed(self, process: LocalProcess, n_last: int) -> int:
+    def _changed(self, process: LocalProcess, n_last: int, sure: float) -> int:
         """How many of the last ``n_last`` movements are of another era."""
         fitted, memory, n = process.fitted(), process.memory, len(process.memory)
         if fitted is None or n - n_last < _PREDICTED:
@@ -178,8 +156,11 @@ class ChangeDetector:
         of_each_other, _ = Era(fitted, tested).left_out(np.arange(len(rows)))
         calibrated = by_halves(earlier, self.problem.policies, tested)
         for errors in (of_each_other, calibrated, shifted_by_halves(tested.outcomes - expected)):
-            for some in (slice(None), as_it_was > failed):  # a local change is seen in those that failed
-                if all(better(of_one[some], errors[some], self.noise) >= SURE for of_one in unchanged):
+            for some, least in (
+                (slice(None), sure),
+                (as_it_was > failed, SURE),
+            ):  # those that failed show a local change
+                if all(better(of_one[some], errors[some], self.noise) >= least for of_one in unchanged):
                     # The suspicion may have begun too early: the first movements then fit the old era better.
                     gains = np.zeros(len(rows))
                     gains[some] = gains_over(as_it_was, errors, self.noise)[some]
@@ -207,7 +188,6 @@ class ChangeDetector:
             together, _ = self._process(helpful.and_then(current), chosen).left_out(len(helpful.thetas) + tested_rows)
             kept = helpful if better(alone, together, self.noise) >= _HELPS else kept
         self._review = _GROWTH * n if len(kept.thetas) else 0
-        self._forget_errors()
         if is_new:
             self._reset_suspicion()
         return Restart(kept.and_then(current), len(kept.thetas), n_before, is_new)
@@ -234,13 +214,6 @@ class ChangeDetector:
         variances_alone = alone.predict(before)[1] * alone.inflation(tested_rows)
         corrected = before._replace(outcomes=before.outcomes + correction)
         return corrected.some(variances * of_unexplained.inflation(tested_rows) < _SURER * variances_alone)
-
-
-def _biased(residuals: Array) -> bool:
-    """Whether the last residuals ``(n, outcome_dim)`` clearly have a mean other than zero in some dimension."""
-    bounded = np.clip(residuals, -_LARGEST_RESIDUAL, _LARGEST_RESIDUAL)
-    lasts = [bounded[-n_last:] for n_last in _BIAS_OF]
-    return any((np.abs(last.sum(axis=0)) > _BIASED * np.sqrt(squared(last.T))).any() for last in lasts)
 
 
 def _fourth_fifth(values: list[float]) -> float:
