@@ -155,11 +155,9 @@ class ChangeDetector:
         unchanged = Era(fitted, Exemplars.of(memory)).left_out(rows)[0], as_it_was
         of_each_other, _ = Era(fitted, tested).left_out(np.arange(len(rows)))
         calibrated = by_halves(earlier, self.problem.policies, tested)
+        subsets = (slice(None), sure), (as_it_was > failed, SURE)  # a local change is seen in those that failed
         for errors in (of_each_other, calibrated, shifted_by_halves(tested.outcomes - expected)):
-            for some, least in (
-                (slice(None), sure),
-                (as_it_was > failed, SURE),
-            ):  # those that failed show a local change
+            for some, least in subsets:
                 if all(better(of_one[some], errors[some], self.noise) >= least for of_one in unchanged):
                     # The suspicion may have begun too early: the first movements then fit the old era better.
                     gains = np.zeros(len(rows))
