@@ -1,1 +1,0 @@
-"""Looking at runs: tables, reports, films, TensorBoard, the demo."""
