@@ -26,14 +26,14 @@ from numpy.typing import ArrayLike
 from lives import Life
 from random_robots import RandomRobot
 from sgimd_torch.algorithms.practice import practice
-from sgimd_torch.environments.mujoco_robot import MujocoRobot
 from sgimd_torch.evaluation import evaluate, tile_goals, tile_side
+from sgimd_torch.extras.models.mujoco_robot import MujocoRobot
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
 from sgimd_torch.options.catalogue import load_word
-from sgimd_torch.runs.tasks import benchmark_of
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Array, stream
+from sgimd_torch.tasks import benchmark_of
 from suite import TASKS
 
 AFTER: Final = (100, 250, 500, 1000)  # movements after the change at which a learner is evaluated

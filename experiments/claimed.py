@@ -13,7 +13,7 @@ import pandas as pd
 
 from evidence import LAST, Evidence, Level, shared
 from judging import Claim, Part, at_least, at_most
-from sgimd_torch.views.statistics import LEVEL, Interval
+from sgimd_torch.extras.table.statistics import LEVEL, Interval
 from suite import TASKS, UNIFORM
 from variants import ARMS, FOUR, HALVES, ROD, SPARSE, VARIANTS
 

@@ -18,7 +18,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from sgimd_torch.runs.signals import command, loading, say
+from sgimd_torch.runs.messages import say
+from sgimd_torch.runs.program import command
+from sgimd_torch.runs.signals import loading
 
 with loading():  # Ctrl-C shows no traceback
     import jinja2

@@ -20,7 +20,9 @@ from itertools import chain
 from pathlib import Path
 from typing import Any, Final
 
-from sgimd_torch.runs.signals import command, loading, say
+from sgimd_torch.runs.messages import say
+from sgimd_torch.runs.program import command
+from sgimd_torch.runs.signals import loading
 
 with loading():  # Ctrl-C shows no traceback
     import numpy as np
@@ -30,13 +32,13 @@ with loading():  # Ctrl-C shows no traceback
     import lives
     import random_robots
     from lives import Life
+    from sgimd_torch.extras.sweep.command import add_options, engine_of
+    from sgimd_torch.extras.sweep.parallel import Job, sweep
     from sgimd_torch.files import make_folder
-    from sgimd_torch.options.catalogue import unknown_name_error
     from sgimd_torch.options.config import OWN, Config
     from sgimd_torch.record import RunError
-    from sgimd_torch.runs.parallel import Job, sweep
     from sgimd_torch.runs.read import finished, read_run
-    from sgimd_torch.runs.sweep import add_options, engine_of
+    from sgimd_torch.texts import unknown_name_error
     from table import FILE, LEARNING, ROWS, TABLES, Row, answers_of, merge, own_answer, read_table, result_rows
     from variants import EXPERIMENTS, MADE, SEEDS, SMALL_TABLES, Variant, make_subsets
 

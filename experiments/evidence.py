@@ -18,8 +18,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from scipy import optimize, stats
 
-from sgimd_torch.spaces import Array
-from sgimd_torch.views.statistics import (
+from sgimd_torch.extras.table.statistics import (
     LEAST_SEEDS,
     LEVEL,
     Interval,
@@ -27,6 +26,7 @@ from sgimd_torch.views.statistics import (
     interquartile_mean,
     interval,
 )
+from sgimd_torch.spaces import Array
 from table import read_table
 
 LAST: Final = 5000  # number of movements of a whole run, as in the paper

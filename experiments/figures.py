@@ -26,7 +26,9 @@ from functools import partial
 from pathlib import Path
 from typing import Final
 
-from sgimd_torch.runs.signals import command, loading, say
+from sgimd_torch.runs.messages import say
+from sgimd_torch.runs.program import command
+from sgimd_torch.runs.signals import loading
 
 with loading():  # Ctrl-C shows no traceback
     import numpy as np
@@ -37,11 +39,11 @@ with loading():  # Ctrl-C shows no traceback
     from evidence import LAST, Evidence, NotRun
     from page_tables import GAIN
     from robot_figures import FIGURES as OF_ROBOTS
-    from sgimd_torch.figures.axes import curve_in_band
-    from sgimd_torch.figures.names import COLOURS, NAMES
-    from sgimd_torch.figures.save import save_figure
+    from sgimd_torch.extras.report.maps import curve_in_band
+    from sgimd_torch.extras.report.save import save_figure
+    from sgimd_torch.extras.table.names import COLOURS, NAMES
+    from sgimd_torch.extras.table.statistics import Interval, bootstrap_rng, iqm_interval
     from sgimd_torch.files import make_folder
-    from sgimd_torch.views.statistics import Interval, bootstrap_rng, iqm_interval
 
 ERROR: Final = "mean distance to the goals (m)"
 LEARNERS: Final = ("random", "sagg-riac", "observation", "imitation", "sgim-d")  # learners of the paper

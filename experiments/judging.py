@@ -13,7 +13,7 @@ from functools import cache, partial
 from typing import Final, NamedTuple
 
 from evidence import Level, NotRun, Statistic
-from sgimd_torch.views.statistics import LEVEL, interval_text
+from sgimd_torch.extras.table.statistics import LEVEL, interval_text
 
 HOLDS: Final = "holds"
 FAILS: Final = "fails"

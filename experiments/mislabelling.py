@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sgimd_torch.asking.teachers import AnsweringTeacher
+from sgimd_torch.extras.asking.teachers import AnsweringTeacher
 from sgimd_torch.spaces import Demonstration, stream
 
 

@@ -24,14 +24,15 @@ import numpy as np
 from scipy import stats
 
 from sgimd_torch.environments.protocol import FromFiles
+from sgimd_torch.extras.sweep.command import cores
+from sgimd_torch.extras.sweep.parallel import Machine, sweep
+from sgimd_torch.extras.table.statistics import LEVEL
 from sgimd_torch.files import make_folder
-from sgimd_torch.options.build import task_of
 from sgimd_torch.options.config import Config
-from sgimd_torch.runs.parallel import Machine, sweep
+from sgimd_torch.runs.messages import say
+from sgimd_torch.runs.plan import task_of
+from sgimd_torch.runs.program import command
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.runs.signals import command, say
-from sgimd_torch.runs.sweep import cores
-from sgimd_torch.views.statistics import LEVEL
 from table import TABLES, Row, merge, read_table
 
 TABLE: Final = "model_files.csv"

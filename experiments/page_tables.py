@@ -15,7 +15,7 @@ from claimed import SUITE, on, paper
 from evidence import LAST, Evidence, NotRun, Statistic
 from judging import MISSING, Claim, Verdict, judge
 from refinement import ROBOTS, SEARCHES, TABLE
-from sgimd_torch.views.statistics import interquartile_mean, interval_text
+from sgimd_torch.extras.table.statistics import interquartile_mean, interval_text
 from suite import TASKS, UNIFORM, titled
 from table import LEARNING, read_table
 from variants import ARMS, EXPERIMENTS, VARIANTS

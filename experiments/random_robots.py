@@ -9,8 +9,8 @@ grows with the movement, or is one gross error in 33 movements.
 
 Numbers 0 to 199 are for development; others below 500, 600 to 697 and 700 to 712 were seen before the defaults were
 what they are.
-Each error is the mean distance between goals and what the answers do without noise. `process` answers; for the standard
-baseline the better of `process` and the nearest exemplar.
+Each error is the mean distance between goals and what the answers do without noise, over the spread of the
+goals. `process` answers for random movements; for the standard baseline, the better of it and the nearest exemplar.
 """
 
 from __future__ import annotations

@@ -22,15 +22,16 @@ from typing import Any, Final
 
 from lives import Life, collect
 from sgimd_torch.evaluation import evaluate
-from sgimd_torch.options.build import build
+from sgimd_torch.extras.sweep.parallel import Machine, sweep
 from sgimd_torch.options.catalogue import ROD
 from sgimd_torch.options.config import Config
-from sgimd_torch.runs.parallel import Machine, sweep
-from sgimd_torch.runs.signals import command, say
+from sgimd_torch.runs.build import build
+from sgimd_torch.runs.messages import say
+from sgimd_torch.runs.program import command
 from sgimd_torch.session import run
 from table import read_table
 
-SEARCHES: Final = ("nelder-mead", "gradient", "gradient-then-nelder-mead")
+SEARCHES: Final = ("nelder-mead", "gradient")
 SGIM_D: Final = {"algorithm": "sgim-d", "environment.threads": 1}
 ROBOTS: Final[Mapping[str, Mapping[str, Any]]] = {  # options of a run, by names of robot and inverse model
     "rod by paper": {**SGIM_D, "environment": ROD, "inverse": "paper"},

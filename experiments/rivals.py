@@ -21,10 +21,10 @@ from ribs.archives import GridArchive
 from ribs.emitters import GaussianEmitter
 
 from sgimd_torch.environments.protocol import Environment
+from sgimd_torch.extras.rivals import quality_diversity
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Learner
 from sgimd_torch.parts import Problem, Strategy
-from sgimd_torch.rivals import quality_diversity
 from sgimd_torch.spaces import Array, Attempt, Move
 
 HOMEWARD: Final = 0.1  # share of paths that begin with the movement home
@@ -125,4 +125,6 @@ def map_elites_middle(environment: Environment, seed: int) -> Learner:
         drawn = int(rng.integers(2**32))
         return [GaussianEmitter(archive, sigma=0.1, initial_solutions=first, batch_size=10, seed=drawn, **bounds)]
 
-    return quality_diversity.quality_diversity(environment, seed, "map-elites", emitters, {}, cells=10)
+    return quality_diversity.quality_diversity(
+        environment, seed, "map-elites", emitters, {}, correspondence=None, cells=10
+    )

@@ -18,9 +18,9 @@ from changing import ANEW, ARM, BEGUN, CHANGES, GOES_ON, ROBOTS, SIMULATOR, WRON
 from evidence import Evidence
 from random_robots import COUNTS, FAMILIES, LEARNERS, NOISES, RANDOM, kind
 from robots import COMPARED, after_change, best, clearly_harmed, errors, over_anew, share
-from sgimd_torch.figures.names import COLOURS, NAMES
+from sgimd_torch.extras.table.names import COLOURS, NAMES
+from sgimd_torch.extras.table.statistics import Interval, bootstrap_rng, iqm_interval
 from sgimd_torch.spaces import Array
-from sgimd_torch.views.statistics import Interval, bootstrap_rng, iqm_interval
 
 FACTORS: Final = np.geomspace(1, 8, 43)  # of a performance profile
 KINDS_AT: Final = 250

@@ -20,9 +20,9 @@ from judging import Claim, Part, at_least, at_most
 from model_files import FILES, REFUSED, RIGHT, WARNED
 from page_tables import MISSING_CELL, Page, markdown
 from random_robots import BASELINE, COUNTS, LEARNERS, RANDOM
-from sgimd_torch.figures.names import NAMES
+from sgimd_torch.extras.table.names import NAMES
+from sgimd_torch.extras.table.statistics import LEVEL, Interval, bootstrap_rng, interval
 from sgimd_torch.spaces import Array
-from sgimd_torch.views.statistics import LEVEL, Interval, bootstrap_rng, interval
 
 COMPARED: Final = tuple(name for name in LEARNERS if name != RANDOM)
 HARMFUL: Final = 1.02  # times the error of random movements; a larger error counts as harm

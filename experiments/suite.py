@@ -26,11 +26,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
+from sgimd_torch.extras.sweep.command import add_options, add_vary, run_all, variants_of
 from sgimd_torch.options.catalogue import ROD
 from sgimd_torch.options.config import Config
+from sgimd_torch.runs.program import command
 from sgimd_torch.runs.read import finished
-from sgimd_torch.runs.signals import command
-from sgimd_torch.runs.sweep import add_options, add_vary, run_all, variants_of
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     options, rest = parsed_options(argv)
     configs = runs_of(options, rest)
     code = run_all(configs, options, configs[0].out.parent)
-    from sgimd_torch.views import table  # scipy's statistics are slow to import
+    from sgimd_torch.extras.table import command as table  # scipy's statistics are slow to import
 
     for folder in [] if options.dry_run else dict.fromkeys(config.out for config in configs if finished(config)):
         print(f"\n{titled(folder.name)}")

@@ -13,10 +13,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from sgimd_torch.environments.controllers import Sinusoids
-from sgimd_torch.environments.from_gymnasium import FromGymnasium, gymnasium
-from sgimd_torch.runs.tasks import Task
+from sgimd_torch.extras.gymnasium.controllers import Sinusoids
+from sgimd_torch.extras.gymnasium.from_gymnasium import FromGymnasium, gymnasium
 from sgimd_torch.spaces import Array, Box
+from sgimd_torch.tasks import Task
 
 DATA: Final = Path(__file__).with_name("data")
 STEPS: Final = 150  # number of actions of a movement, .04 s each

@@ -17,18 +17,18 @@ from typing import Any, Final
 import numpy as np
 import pandas as pd
 
-from sgimd_torch.asking.teachers import middle
 from sgimd_torch.evaluation import Benchmark
+from sgimd_torch.extras.asking.teachers import middle
 from sgimd_torch.files import checksum, make_folder, write_text
-from sgimd_torch.options.build import task_of
 from sgimd_torch.options.config import OWN, Config
+from sgimd_torch.runs.plan import task_of
 from sgimd_torch.runs.read import Run
-from sgimd_torch.runs.tasks import benchmark_of
-from sgimd_torch.runs.tasks.taught import demonstrations_of
 from sgimd_torch.spaces import Array
+from sgimd_torch.tasks import benchmark_of
+from sgimd_torch.tasks.taught import demonstrations_of
 
 Row = dict[str, Any]
-REFERENCE: Final = Path(__file__).parents[1] / "tests" / "learner" / "reference.npz"
+REFERENCE: Final = Path(__file__).parents[1] / "tests" / "helpers" / "reference.npz"
 LEARNING: Final = checksum(REFERENCE)
 """Name of the learning of this library: checksum of the numbers that tests/learner/test_reference.py compares."""
 FILE: Final = "results.csv"
@@ -194,7 +194,7 @@ def asked_rows(config: Config, run: Run) -> list[Row]:
             "weak": outwards < 1 / 3,
         }
     )
-    teachers = config.teachers or ("all",)
+    teachers = config["teachers"] or ("all",)
     counts = counted.groupby(asked["teacher"]).sum().reindex(teachers, fill_value=0).astype(int)
     key = {"variant": config.variant, "seed": config.seed}
     return [{**key, "teacher": word.rpartition(":")[2], **row} for word, row in counts.to_dict("index").items()]

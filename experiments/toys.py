@@ -26,9 +26,9 @@ from numpy.typing import ArrayLike, NDArray
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.protocol import check_movement
 from sgimd_torch.evaluation import Benchmark, tile_goals
-from sgimd_torch.runs.tasks import Task
-from sgimd_torch.runs.tasks.robots import arm_benchmark
 from sgimd_torch.spaces import Array, Box, Demonstration, check_rng, stream
+from sgimd_torch.tasks import Task
+from sgimd_torch.tasks.robots import arm_benchmark
 
 GRAVITY: Final = 9.81  # m/s^2
 STROKES: Final = 10  # number of strokes in one movement of the crawler

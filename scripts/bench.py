@@ -24,7 +24,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
-from contextlib import closing
+from contextlib import closing, nullcontext
 from functools import partial
 from itertools import islice, product
 from pathlib import Path
@@ -121,15 +121,17 @@ def live(name: str, movements: int) -> Figures:
 def at_once(movements: int) -> Figures:
     """Movements a second by the clock, with several robots at once."""
     from sgimd_torch import FishingRod, practice, run
-    from sgimd_torch.runs.run import executing
-    from sgimd_torch.session import JOINS_EVERY
+    from sgimd_torch.environments.protocol import moves_in_batches
+    from sgimd_torch.extras.at_once.processes import in_processes
+    from sgimd_torch.session import JOINS_EVERY, live
 
     figures: Figures = {}
     robots = ("rod", FishingRod, (1, 2, 8)), ("an arm of 20 ms", partial(SlowArm, 7, noise=0.02), (1, 2))
     for name, make, numbers in robots:
         for number in numbers:
             robot: Any = make()
-            with executing(robot, make, 0, number) as execute:
+            alone = number == 1 or moves_in_batches(robot)
+            with nullcontext(live(robot, 0)) if alone else in_processes(make, 0, number) as execute:
                 life = run(practice(robot, 0), robot, 0, movements=10**9, execute=execute, at_once=number)
                 for _ in range(JOINS_EVERY * number):  # all robots join, processes start
                     next(life)

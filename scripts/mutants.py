@@ -96,9 +96,9 @@ gross errors: precisions keep what they were | inverses/kernels.py | inverses/te
     precision[j] -= shrinking * column[j] ** 2 ==> precision[j] -= 0 * column[j]
 a Gaussian process with another kernel | inverses/kernels.py | inverses/test_local_process.py
     5 / 3 * distance**2) * decay ==> 5 / 2 * distance**2) * decay
-requests: a teacher without a reply costs nothing | asking/strategy.py | asking/test_asking.py
+requests: a teacher without a reply costs nothing | extras/asking/strategy.py | extras/asking/test_asking.py
     strategy=strategy, gain=-1.0) ==> strategy=strategy, gain=0.0)
-requests: costs do not count | asking/interest.py | asking/test_interest.py
+requests: costs do not count | extras/asking/interest.py | extras/asking/test_interest.py
     - np.log(cost) ==> - 0 * np.log(cost)
 record: the outcome in the columns of the goal | record/layout.py | record/test_record.py
     *_cells(event.goal, t), ==> *_cells(event.outcome, t),

@@ -13,17 +13,31 @@ Modules for each section of the paper:
     5.2    evaluation                                      evaluation (eq. 10)
     5.3    demonstrations and teachers                     demonstrations, teachers
     -      practice, our default learner                   algorithms.practice
-    -      asking teachers: SGIM-IM, SGIM-ACTS             asking
     -      a forward model, our addition                   forward_model
-    -      robots of gymnasium; our robots in gymnasium    environments.from_gymnasium, environments.to_gymnasium
-    -      other algorithms to compare with                rivals
 
 ``parts`` says what each kind of part is given and must do. ``record`` keeps all events in the life of a learner.
-``runs`` makes runs on disk; ``views``, ``board`` (TensorBoard) and ``figures`` show them. The command ``sgimd`` calls
-these folders. ``__init__.pyi`` lists the public names of this package. A name is loaded when it is first used.
+``runs`` makes runs on disk; ``board`` shows them in TensorBoard. All of this is the core; around it stand rooms, see
+``rooms`` and ``docs/explained/house.md``. ``__init__.pyi`` lists the public names of the core, each room its own. A
+name is loaded when it is first used.
 """
+
+import importlib
+from typing import Any
 
 import lazy_loader
 
-__version__ = "0.4.0"
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+from sgimd_torch.rooms import public_names
+
+__version__ = "0.5.0"
+_of_core, _, _names = lazy_loader.attach_stub(__name__, __file__)
+__all__ = [*_names, *public_names()]
+
+
+def __getattr__(name: str) -> Any:
+    if name in public_names():
+        return getattr(importlib.import_module(f"{__name__}.{public_names()[name]}"), name)
+    return _of_core(name)
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -1,3 +1,5 @@
+import typing
+
 from .algorithms.paper import imitation as imitation
 from .algorithms.paper import observation as observation
 from .algorithms.paper import random_exploration as random_exploration
@@ -10,13 +12,12 @@ from .algorithms.practice import practice_taught as practice_taught
 from .competence import performance as performance
 from .demonstrations import load_demonstrations as load_demonstrations
 from .demonstrations import save_demonstrations as save_demonstrations
-from .environments.check import check_environment as check_environment
 from .environments.fishing_rod import FishingRod as FishingRod
 from .environments.motor_primitives import GaussianPrimitive as GaussianPrimitive
-from .environments.mujoco_robot import MujocoRobot as MujocoRobot
 from .environments.planar_arm import PlanarArm as PlanarArm
 from .environments.protocol import Environment as Environment
 from .environments.protocol import SimulationError as SimulationError
+from .environments.sketch import Sketch as Sketch
 from .evaluation import Benchmark as Benchmark
 from .evaluation import Evaluation as Evaluation
 from .evaluation import evaluate as evaluate
@@ -53,3 +54,5 @@ from .teachers import InitialTeacher as InitialTeacher
 from .teachers import PeriodicTeacher as PeriodicTeacher
 
 __version__: str
+
+def __getattr__(name: str) -> typing.Any: ...  # names of rooms

@@ -41,7 +41,7 @@ class Competence(Judge):
 
     This is gamma of eq. (2), over the whole memory. In one context it never falls while the robot stays the same.
 
-    Deviation: when the robot has changed, memory keeps only what still holds (`sgimd_torch.changes`), so competence
+    Deviation: when the robot has changed, memory keeps only what still holds (`Watcher`), so competence
     falls again where nothing reaches the goal any more.
 
     Deviation: the paper prints the minimum over memory, but J is negative, so the best J is the maximum, the J of the

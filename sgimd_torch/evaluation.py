@@ -129,18 +129,18 @@ class OwnGoals:
     missed: list[float] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self._seen: dict[bytes, tuple[int, int]] = {}  # for each goal its place, and the number of its last movement
+        self._seen: dict[bytes, tuple[int, int]] = {}  # for each goal its number, and the number of its last movement
 
     def add(self, index: int, goal: Array, outcome: Array) -> None:
         """Count the movement with the number ``index``, which had an outcome."""
         key = goal.tobytes()
-        place, last = self._seen.get(key, (0, -self.at_once - 1))
+        number, last = self._seen.get(key, (0, -self.at_once - 1))
         if index - last > self.at_once:
-            place = len(self.begun)
+            number = len(self.begun)
             self.begun.append(index)
             self.missed.append(np.inf)
-        self._seen[key] = place, index
-        self.missed[place] = min(self.missed[place], math.dist(outcome, goal))
+        self._seen[key] = number, index
+        self.missed[number] = min(self.missed[number], math.dist(outcome, goal))
 
     def recent_misses(self, movements: int) -> Array:
         """``(n,)``, distances missed at the last 50 goals begun in this number of ``movements``, or fewer."""

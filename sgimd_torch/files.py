@@ -7,12 +7,10 @@ All modules of the library replace files by these functions.
 
 from __future__ import annotations
 
+import csv
 import io
-import lzma
-import math
 import os
 import stat
-import tokenize
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
@@ -25,13 +23,7 @@ from numpy.typing import NDArray
 
 Stored = NDArray[Any]
 
-_UNREADABLE: Final = (
-    *(ValueError, TypeError, AttributeError, OSError, EOFError, RuntimeError, MemoryError, OverflowError),
-    *(SyntaxError, tokenize.TokenError, zipfile.BadZipFile, zlib.error, lzma.LZMAError),
-)
 _RECORD: Final = b"SQLite format 3", b"7\x7f\x06"  # beginnings of a record and of its write-ahead log
-LARGE: Final = 2**28  # bytes that any file may take
-_DENSE: Final = 100  # bytes that each byte of a larger file may take
 
 
 def check_regular(path: str | os.PathLike[str]) -> None:
@@ -43,16 +35,6 @@ def check_regular(path: str | os.PathLike[str]) -> None:
     mode = os.stat(path).st_mode
     if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
         raise OSError(f"{path} is a pipe or a device, not a file")
-
-
-def check_density(n_bytes: int, path: str | os.PathLike[str]) -> None:
-    """Refuse a file before its content takes ``n_bytes`` of memory, if the file is far too small for them.
-
-    Raises:
-        ValueError: the content would take more than 256 MB, and more than 100 times the size of the file.
-    """
-    if n_bytes > max(LARGE, _DENSE * os.path.getsize(path)):
-        raise ValueError(f"it would take {n_bytes} bytes of memory, far more than the {os.path.getsize(path)} it has")
 
 
 @contextmanager
@@ -91,7 +73,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
 
 
 def is_record(path: Path) -> bool:
-    """Whether a file is an SQLite file or the write-ahead log of one."""
+    """Whether a file is an SQLite file or the write-ahead log of one, as the record of a run is."""
     with path.open("rb") as file:
         return file.read(16).startswith(_RECORD)
 
@@ -149,29 +131,17 @@ def read_npz(path: str | os.PathLike[str], kind: str, writer: str, names: Sequen
             raise refused("it is not an npz file")
         file.seek(0)
         try:
-            with zipfile.ZipFile(file) as stored:
-                known = {info.filename: info for info in stored.infolist()}
-                wanted = {name: known[f"{name}.npy"] for name in names if f"{name}.npy" in known}
-                check_density(sum(info.file_size for info in wanted.values()), path)
-                arrays = {name: _array(stored, info) for name, info in wanted.items()}
-            for array in arrays.values():
-                array.flags.writeable = False
-        except _UNREADABLE as error:  # numpy's own message advises allow_pickle=True, which is unsafe
+            stored = np.load(file, allow_pickle=False)
+            arrays: dict[str, Stored] = {name: stored[name] for name in names if name in stored}
+            if not all(isinstance(array, np.ndarray) for array in arrays.values()):
+                raise ValueError
+        except (ValueError, OSError, EOFError, zipfile.BadZipFile, zlib.error) as error:
             raise refused("it is damaged, or holds more than numbers") from error
+    for array in arrays.values():
+        array.flags.writeable = False
     if missing := [name for name in names if name not in arrays]:
         raise refused(f"it lacks {', '.join(missing)}")
     return [arrays[name] for name in names]
-
-
-def _array(stored: zipfile.ZipFile, info: zipfile.ZipInfo) -> Stored:
-    """An array of an npz file, if it is as long as its header says."""
-    with stored.open(info) as member:
-        head = np.lib.format.read_array_header_1_0 if np.lib.format.read_magic(member) == (1, 0) else None
-        shape, _, kind = (head or np.lib.format.read_array_header_2_0)(member)
-        if math.prod(shape) * kind.itemsize != info.file_size - member.tell():
-            raise ValueError(f"{info.filename} has not as many numbers as it says")
-    with stored.open(info) as member:
-        return np.asarray(np.lib.format.read_array(member, allow_pickle=False))
 
 
 def checksum(path: Path) -> str:
@@ -192,3 +162,18 @@ def make_folder(path: Path) -> None:
         raise OSError(
             f"{path} cannot be made: {error.strerror}; is a file in its place? Choose another --out"
         ) from error
+
+
+def read_csv(path: Path) -> list[tuple[int, list[str]]]:
+    """The rows of a table with commas that have any field, each with the number of its line, from 1.
+
+    Raises:
+        ValueError: the file is no such table.
+        OSError: there is no file, or it is a pipe or a device.
+    """
+    check_regular(path)
+    with path.open(encoding="utf-8", newline="") as file:
+        try:
+            return [(rows.line_num, row) for rows in [csv.reader(file)] for row in rows if row]
+        except (csv.Error, UnicodeDecodeError) as error:
+            raise ValueError(f"{path} is no csv file: {error}") from error

@@ -16,9 +16,9 @@ from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
+from sgimd_torch.calls import Built
 from sgimd_torch.environments.protocol import Environment, check_robot
 from sgimd_torch.memory import Memory
-from sgimd_torch.options.built import Built
 from sgimd_torch.spaces import Array, AskingAttempt, Attempt, Demonstration, Estimate, stream
 
 Made = TypeVar("Made")
@@ -193,7 +193,6 @@ class Explore(Part):
     def __call__(self, context: Array) -> Array:
         """The next movement, ``(theta_dim,)`` in Pi."""
 
-    @property
     def share(self) -> float | None:
         """Probability of a global movement. Default: None, which means that competence at the goal decides."""
         return None
@@ -241,7 +240,7 @@ class Teacher(Built):
 
     Attributes:
         who: name of the person who gave the last demonstration, for the record.
-        needs_demonstrations: False for a teacher without prepared demonstrations.
+        needs_demonstrations: whether its class needs prepared demonstrations.
     """
 
     needs_demonstrations: ClassVar[bool] = True

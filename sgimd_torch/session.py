@@ -132,27 +132,27 @@ def run(
         failed_in_a_row: list[Failure] = []
         while (first := learner.movements) < movements:
             contexts: list[Array | Failure] = []
-            for place in range(min(at_once, max(1, first // JOINS_EVERY), movements - first)):
-                index = first + place
-                preceding = _offered(learner, teacher, index, place, before.get(place, BeforeMovement()))
-                context = _observed(learner, environment, index, place, seed)
+            for robot in range(min(at_once, max(1, first // JOINS_EVERY), movements - first)):
+                index = first + robot
+                preceding = _offered(learner, teacher, index, robot, before.get(robot, BeforeMovement()))
+                context = _observed(learner, environment, index, robot, seed)
                 if teachers and preceding.request is None and not isinstance(context, Failure):
-                    preceding = _asked(learner, environment, context, place, teachers, preceding)
-                before[place] = preceding
+                    preceding = _asked(learner, environment, context, robot, teachers, preceding)
+                before[robot] = preceding
                 contexts.append(context)
             moves = learner.ask_many(contexts)
             outcomes = _executed(execute, first, contexts, moves)
             learner.tell_many(outcomes)
-            for place, (context, move, outcome) in enumerate(zip(contexts, moves, outcomes, strict=True)):
+            for robot, (context, move, outcome) in enumerate(zip(contexts, moves, outcomes, strict=True)):
                 seen = np.full(environment.contexts.dim, np.nan) if isinstance(context, Failure) else context
-                preceding = before.pop(place)
+                preceding = before.pop(robot)
                 if isinstance(outcome, Failure):
                     failed_in_a_row.append(outcome)
-                    yield Episode(first + place, seen, move, None, *preceding, outcome.reason)
+                    yield Episode(first + robot, seen, move, None, *preceding, outcome.reason)
                 else:
                     if move is not None and len(failed_in_a_row) < failures:
                         failed_in_a_row.clear()
-                    yield Episode(first + place, seen, move, outcome, *preceding)
+                    yield Episode(first + robot, seen, move, outcome, *preceding)
             if len(failed_in_a_row) >= failures:
                 last = failed_in_a_row[-1]
                 reason = f"{len(failed_in_a_row)} movements in a row failed, the last one: {last.reason}"
@@ -160,21 +160,21 @@ def run(
 
 
 def _offered(
-    learner: Learner, teacher: Teacher | None, index: int, place: int, before: BeforeMovement
+    learner: Learner, teacher: Teacher | None, index: int, robot: int, before: BeforeMovement
 ) -> BeforeMovement:
     """Let the teacher offer a demonstration, unless the robot has not yet used the last one."""
-    if teacher is None or learner.lesson_waits_at(place):
+    if teacher is None or learner.lesson_waits_for(robot):
         return before
     offered = teacher.offer(index, learner.memory)
     if offered is None:
         return before
-    learner.watch(offered, who=teacher.who, place=place)
+    learner.watch(offered, who=teacher.who, robot=robot)
     return before._replace(demonstration=offered)
 
 
-def _observed(learner: Learner, environment: Environment, index: int, place: int, seed: int) -> Array | Failure:
+def _observed(learner: Learner, environment: Environment, index: int, robot: int, seed: int) -> Array | Failure:
     """The context of the next movement: the context of the current attempt, or a new one if an attempt is to begin."""
-    context = learner.context_at(place)
+    context = learner.context_of(robot)
     if context is not None:
         return context
     return tried("context", environment.contexts.dim, observed, environment, stream(seed, "context", index))
@@ -184,19 +184,19 @@ def _asked(
     learner: Learner,
     environment: Environment,
     context: Array,
-    place: int,
+    robot: int,
     teachers: Mapping[str, Demonstrator],
     before: BeforeMovement,
 ) -> BeforeMovement:
     """Let the learner ask one of the ``teachers`` for a demonstration, and show the learner the reply."""
-    request = learner.request(context, place=place)
+    request = learner.request(context, robot=robot)
     if request is None:
         return before
     demonstration, reply = _reply(learner, environment, context, request, teachers)
     if demonstration is None:
-        learner.go_on_alone(reply, place=place)
+        learner.go_on_alone(reply, robot=robot)
         return before._replace(request=request, reply=reply)
-    learner.watch(demonstration, place=place)
+    learner.watch(demonstration, robot=robot)
     return BeforeMovement(demonstration, request, reply)
 
 

@@ -287,7 +287,7 @@ class Estimate(NamedTuple):
     exemplars at which a search may begin, ``thetas`` ``(k, theta_dim)`` with ``outcomes`` ``(k, outcome_dim)``.
 
     ``expected`` ``(outcome_dim,)`` is the outcome that the inverse model expects of theta, and ``sd`` the standard
-    deviation from it in each dimension, noise included, in the unit of T; None: the inverse model does not know.
+    deviation from it, one for all dimensions, noise included, in the unit of T; None: the inverse model does not know.
         estimate = learner.inverse(context, goal); estimate.expected, estimate.expected_error(goal)
     """
 

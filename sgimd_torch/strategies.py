@@ -143,9 +143,8 @@ class GoalBabbling(Strategy):
             strategy: name of the strategy that chose the goal: "autonomous", "social" or another name.
         """
         if outcomes:
-            judged = after = self.competence_at(context, goal)
-            if type(self.judge) is not Competence:
-                judged = self.judge(context, goal, np.stack(outcomes))
+            after = self.competence_at(context, goal)
+            judged = self.judge(context, goal, np.stack(outcomes)) if self.goals.by_competence else after
             # The new nearest exemplar in (context, outcome) may be farther in outcome alone; this is no loss.
             gain = max(0.0, after - competence_before)
             if gain == 0 and judged != after:  # the judge rates the attempt alone, which may be worse than the memory
@@ -165,7 +164,7 @@ class GoalBabbling(Strategy):
         """Probability of global exploration; the lower the competence at the goal, the higher."""
         if len(self.memory) == 0:
             return 1.0
-        share = self.explore.share  # read once, because each read looks for effects
+        share = self.explore.share()
         if share is not None:
             return share
         # Deviation: the paper's probability is -J. Here it is clipped, so that both kinds are always possible.

@@ -5,13 +5,17 @@ import sys
 
 import numpy as np
 import pytest
+from hypothesis.internal.conjecture import providers
+from hypothesis.internal.constants_ast import Constants
 
 from own import MODULE
 from runs import arguments, content_of
 from sgimd_torch.evaluation import Benchmark, save_benchmark
-from sgimd_torch.options.command_line import main
-from sgimd_torch.runs.signals import command
+from sgimd_torch.runs.command import main
+from sgimd_torch.runs.program import command
 
+# Hypothesis draws constants that stand in modules which happen to be loaded; a result shall not depend on other tests.
+providers._get_local_constants = Constants
 # MuJoCo is imported without OpenGL, as a display may be missing; pictures in space are made in processes of their own.
 os.environ.setdefault("MUJOCO_GL", "disable")
 
@@ -69,3 +73,11 @@ def module(tmp_path, monkeypatch):
 def own(module):
     """Environments of a user's own, the module ``sliders``; returns the working directory."""
     return module("sliders", MODULE)
+
+
+@pytest.fixture
+def undrawn(monkeypatch):
+    """Figures are made, but saved as files of no bytes; most of the time of a page is spent on drawing."""
+    from matplotlib.figure import Figure
+
+    monkeypatch.setattr(Figure, "savefig", lambda *_, **__: None)

@@ -21,24 +21,8 @@ from sgimd_torch.evaluation import (
     tile_goals,
 )
 from sgimd_torch.inverses.nearest import NearestNeighbour
-from sgimd_torch.parts import Inverse
-from sgimd_torch.runs.until import expected_error, goals_reached
-from sgimd_torch.spaces import Array, Box, Estimate, stream
-from worlds import NO_CONTEXT, executed, problem
-
-
-class Perfect(Inverse):
-    """The exact inverse of an arm, and the contexts that it was asked about."""
-
-    def __init__(self, arm: PlanarArm) -> None:
-        super().__init__(problem(arm))
-        self.arm = arm
-        self.asked: list[list[float]] = []
-
-    def __call__(self, context: Array, goal: Array) -> Estimate:
-        self.asked.append(context.tolist())
-        theta = self.arm.solve(context, goal)
-        return Estimate(theta, theta[None], goal[None])
+from sgimd_torch.spaces import Array, Box, stream
+from worlds import NO_CONTEXT, Perfect, Sure, executed, problem
 
 
 def test_errors_are_the_distances_between_goals_and_where_the_best_movements_end() -> None:
@@ -53,30 +37,12 @@ def test_errors_are_the_distances_between_goals_and_where_the_best_movements_end
     assert evaluation.thetas.tolist() == [[0.5, 0.5], [0.5, 0.5], [0.75, 0.5]]
 
 
-class Sure(Perfect):
-    """It expects outcomes .3 beside the goal, with a standard deviation of .4 / sqrt(pi / 2)."""
-
-    def __call__(self, context: Array, goal: Array) -> Estimate:
-        return super().__call__(context, goal)._replace(expected=np.add(goal, [0.3, 0.0]), sd=0.4 / np.sqrt(np.pi / 2))
-
-
 def test_an_evaluation_has_the_errors_that_were_expected_and_none_of_who_does_not_say() -> None:
     arm, goals = PlanarArm(5), stream(0, "goals").uniform(-0.6, 0.6, (4, 2))
     found = evaluate(Sure(arm), arm, goals, 0, 0, repeats=0)
     assert found.errors == pytest.approx(np.zeros(4), abs=1e-9)
     assert found.expected == pytest.approx(np.full(4, 0.5))
     assert np.isnan(evaluate(Perfect(arm), arm, goals, 0, 0, repeats=0).expected).all()
-
-
-def test_an_error_is_expected_in_remembered_contexts_at_goals_such_as_one_in_each_tile_with_two_outcomes() -> None:
-    arm = PlanarArm(5, context=True)
-    inverse, rng = Sure(arm), stream(0, "draws")
-    memory = inverse.problem.memory
-    for context, outcome in ((0.2, 0.5), (0.3, 0.5), (0.4, -0.9)):
-        memory.add(np.array([context]), np.full(5, 0.5), np.array([outcome, outcome]))
-    assert expected_error(inverse, np.zeros((30, 2)), rng) == pytest.approx(0.5)
-    assert {*inverse.asked[0]} | {*inverse.asked[1]} <= {0.2, 0.3, 0.4}
-    assert len(goals_reached(inverse, rng)) == 1  # one tile has two outcomes
 
 
 def test_each_goal_has_a_context_of_its_own_the_same_in_every_evaluation_of_every_run() -> None:

@@ -1,8 +1,47 @@
 """Learners in a few lines each: the five of the paper in ``paper``, our own in ``practice``."""
 
-from collections.abc import Callable
-from typing import TypeAlias
+from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Final, TypeAlias
+
+from sgimd_torch.learner import Learner, Watcher
+from sgimd_torch.memory import Memory
 from sgimd_torch.parts import Inverse, Problem
+from sgimd_torch.rooms import Usual
 
 MakeInverse: TypeAlias = Callable[[Problem], Inverse]
+Begin: TypeAlias = Callable[[int, Memory | None], Learner]
+"""Function (seed, exemplars to start from) -> learner."""
+MakeWatcher: TypeAlias = Callable[[Begin, Learner, Memory | None], Watcher | None]
+"""Function (begin, learner, prior) -> watcher of the learner; None: nobody watches."""
+
+
+def nobody(begin: Begin, learner: Learner, prior: Memory | None) -> Watcher | None:
+    """Nobody: changes of the robot are not noticed."""
+    if prior is not None:
+        raise ValueError("prior (--begin-with) needs a watcher, which finds out what holds of it; got none")
+    return None
+
+
+usual_watcher: Final = Usual("watch", "none", nobody)
+
+
+def watched(begin: Begin, seed: int, memory: Memory | None, prior: Memory | None, watch: MakeWatcher) -> Learner:
+    """The learner that ``begin`` builds; where its robot changes, ``watch`` makes it begin again.
+
+    Args:
+        begin: function that builds the learner.
+        seed: number from which all random streams of the learner come.
+        memory: exemplars to start from; None: no exemplars.
+        prior: exemplars of another robot, such as a simulator; they count as far as they hold. None: no exemplars.
+        watch: watcher.
+
+    Raises:
+        ValueError: both ``memory`` and ``prior`` are given, or the watcher refuses the learner.
+    """
+    if memory is not None and prior is not None:
+        raise ValueError("give memory, exemplars of this robot, or prior, exemplars of another robot; got both")
+    learner = begin(seed, memory if prior is None else prior)
+    learner.watcher = watch(begin, learner, prior)
+    return learner

@@ -14,8 +14,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, Final
 
-from sgimd_torch.algorithms import MakeInverse
-from sgimd_torch.changes import noticing_changes
+from sgimd_torch.algorithms import MakeInverse, MakeWatcher, usual_watcher, watched
+from sgimd_torch.calls import with_keywords_of
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.goals.regions import absolute_progress
@@ -23,7 +23,6 @@ from sgimd_torch.inverses.local import LocalInverse
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Correspondence, Learner
 from sgimd_torch.memory import Memory
-from sgimd_torch.options.signature import with_keywords_of
 from sgimd_torch.parts import Problem, Social
 from sgimd_torch.searches.simplex import NelderMead
 from sgimd_torch.strategies import Babble, GoalBabbling, Imitate, Mimic, Remember, Rest
@@ -94,6 +93,7 @@ def sagg_riac(
     inverse: MakeInverse = LocalProcess,
     memory: Memory | None = None,
     prior: Memory | None = None,
+    watch: MakeWatcher = usual_watcher,
     **parts: Any,
 ) -> Learner:
     """SAGG-RIAC: goal babbling without a teacher, with our inverse model and exploration.
@@ -104,6 +104,7 @@ def sagg_riac(
         inverse: inverse model; searches begin at its answer.
         memory: exemplars to start from; None: the memory starts empty.
         prior: exemplars of another robot, such as a simulator, which count as far as they hold; None: no exemplars.
+        watch: watcher, which notices changes of the robot.
         parts: parts and options of `GoalBabbling`.
     """
 
@@ -111,7 +112,7 @@ def sagg_riac(
         problem = Problem(environment, seed, memory, inverse=inverse)
         return Learner(problem, GoalBabbling(problem, **parts))
 
-    return noticing_changes(begin, seed, memory, prior)
+    return watched(begin, seed, memory, prior, watch)
 
 
 @with_keywords_of(GoalBabbling, goals=InterestMap, search=NelderMead)
@@ -124,6 +125,7 @@ def sgim_d(
     inverse: MakeInverse = LocalProcess,
     memory: Memory | None = None,
     prior: Memory | None = None,
+    watch: MakeWatcher = usual_watcher,
     **parts: Any,
 ) -> Learner:
     """SGIM-D: the paper's algorithm with our inverse model and exploration; as printed: sgim-d-letter.
@@ -138,6 +140,7 @@ def sgim_d(
         inverse: inverse model; searches begin at its answer.
         memory: exemplars to start from; None: the memory starts empty.
         prior: exemplars of another robot, such as a simulator, which count as far as they hold; None: no exemplars.
+        watch: watcher, which notices changes of the robot.
         parts: parts and options of `GoalBabbling`.
     """
 
@@ -146,7 +149,7 @@ def sgim_d(
         problem.autonomous = GoalBabbling(problem, **parts)
         return Learner(problem, problem.autonomous, social=Social.of(social, problem), correspondence=correspondence)
 
-    return noticing_changes(begin, seed, memory, prior)
+    return watched(begin, seed, memory, prior, watch)
 
 
 @with_keywords_of(sagg_riac, inverse=LocalInverse, **LETTER)

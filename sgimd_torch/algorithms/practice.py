@@ -11,14 +11,13 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, Final
 
-from sgimd_torch.algorithms import MakeInverse
-from sgimd_torch.changes import noticing_changes
+from sgimd_torch.algorithms import MakeInverse, MakeWatcher, usual_watcher, watched
+from sgimd_torch.calls import with_keywords_of
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.goals.within_reach import WithinReach
 from sgimd_torch.inverses.among_effects import AmongEffects
 from sgimd_torch.learner import Correspondence, Learner
 from sgimd_torch.memory import Memory
-from sgimd_torch.options.signature import with_keywords_of
 from sgimd_torch.parts import Problem, Social
 from sgimd_torch.searches.explore import Returning
 from sgimd_torch.searches.vary import Vary
@@ -42,6 +41,7 @@ def practice(
     inverse: MakeInverse = AmongEffects,
     memory: Memory | None = None,
     prior: Memory | None = None,
+    watch: MakeWatcher = usual_watcher,
     **parts: Any,
 ) -> Learner:
     """Practice: one movement for each goal within reach, by a local Gaussian process; no teacher."""
@@ -50,7 +50,7 @@ def practice(
         problem = Problem(environment, seed, memory, inverse=inverse)
         return Learner(problem, GoalBabbling(problem, **parts))
 
-    return noticing_changes(begin, seed, memory, prior)
+    return watched(begin, seed, memory, prior, watch)
 
 
 @with_keywords_of(GoalBabbling, **PRACTICE)
@@ -63,6 +63,7 @@ def practice_taught(
     inverse: MakeInverse = AmongEffects,
     memory: Memory | None = None,
     prior: Memory | None = None,
+    watch: MakeWatcher = usual_watcher,
     **parts: Any,
 ) -> Learner:
     """Practice, one movement for each goal within reach; executes each demonstration once, exactly.
@@ -75,4 +76,4 @@ def practice_taught(
         problem.autonomous = GoalBabbling(problem, **parts)  # its goal model is told of demonstrated goals
         return Learner(problem, problem.autonomous, social=Social.of(social, problem), correspondence=correspondence)
 
-    return noticing_changes(begin, seed, memory, prior)
+    return watched(begin, seed, memory, prior, watch)

@@ -11,10 +11,12 @@ import json
 import math
 import re
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+from numpy.typing import NDArray
 from tensorboardX import summary
 from tensorboardX.event_file_writer import EventsWriter
 from tensorboardX.proto.event_pb2 import Event, SessionLog
@@ -22,8 +24,9 @@ from tensorboardX.proto.summary_pb2 import Summary
 
 from sgimd_torch.board.curves import Behaviour, OwnRegions, evaluation_curves, region_curves
 from sgimd_torch.board.legend import as_markdown, meaning_of
-from sgimd_torch.board.pictures import maps_of
 from sgimd_torch.evaluation import Benchmark, Evaluation
+from sgimd_torch.goals.regions import Region
+from sgimd_torch.runs.hooks import Listener
 from sgimd_torch.spaces import Box, Episode
 
 EVERY: Final = 50  # number of movements from one point of a curve to the next
@@ -80,8 +83,8 @@ class EventFile:
             self._writer.close()
 
 
-class BoardListener(EventFile):
-    """A listener that writes the curves and pictures of a run.
+class BoardListener(EventFile, Listener):
+    """A listener that writes the curves of a run.
 
     Args:
         folder: folder of the run; its event files do not change before ``begin``, the end of a replay.
@@ -100,11 +103,10 @@ class BoardListener(EventFile):
         super().__init__(folder)
         self._config, self._learner, self._seconds, self._curves = parts.config, parts.learner, seconds, curves
         self._space: Box = parts.environment.outcomes
-        self._contexts: Box = parts.environment.contexts
         self._benchmark: Benchmark = parts.benchmark
-        self._behaviour = Behaviour(parts.learner.problem.tolerance, parts.config.at_once)
+        self._behaviour = Behaviour(parts.learner.problem.tolerance, parts.robots)
         self._own = OwnRegions(parts.learner.problem)
-        self._movements = self._drawn_at = self._changes = 0
+        self._movements = self._changes = 0
         self._has_regions = True  # until a board without them says so
         self._explained: set[str] = set()
         # The result on TensorBoard's page of hyperparameters.
@@ -121,7 +123,7 @@ class BoardListener(EventFile):
         if self._movements % EVERY == 0:
             if not self._learner.regions:
                 self._own.follow(self._behaviour)
-            regions = self._learner.regions or self._own.regions
+            regions = self.regions
             if bool(regions) != self._has_regions:
                 self._has_regions = bool(regions)
                 self.add(self._movements, summary.text("about/regions", HAS_REGIONS if regions else NO_REGIONS))
@@ -135,23 +137,20 @@ class BoardListener(EventFile):
         self._changes = len(self._learner.changes)
 
     def evaluated(self, movements: int, evaluations: Mapping[str, Evaluation]) -> None:
-        """Show an evaluation; of inverse models other than the run's own, show only the mean error.
-
-        Pictures take as long as 100 movements. So they are drawn only when the number of movements has doubled since
-        the last pictures, and at the end.
-        """
-        own, goals = evaluations["own"], self._benchmark.goals
+        """Show an evaluation; of inverse models other than the run's own, show only the mean error."""
+        own = evaluations["own"]
         others = {f"error/by_{name}": other.mean_error for name, other in evaluations.items() if name != "own"}
         self._scalars({**evaluation_curves(own, self._benchmark.side / 2), **others})
-        if movements >= 2 * self._drawn_at or movements == self._config.movements:
-            self._drawn_at = movements
-            maps = maps_of(self._learner.regions or self._own.regions, self._space, self._contexts, goals, own.errors)
-            pictures = {tag: summary.image(tag, picture, dataformats="HWC") for tag, picture in maps.items()}
-            self._show("images", {tag: made.value[0] for tag, made in pictures.items()})
 
-    def curves(self) -> Mapping[str, float]:
-        """No numbers, because the board only draws those of other listeners."""
-        return {}
+    @property
+    def regions(self) -> Sequence[Region]:
+        """Regions of the goal model; if it has none, those that the board has made."""
+        return self._learner.regions or self._own.regions
+
+    def show_pictures(self, pictures: Mapping[str, NDArray[np.uint8]]) -> None:
+        """Add pictures ``(height, width, 4)`` by tag, at the last movement."""
+        made = {tag: summary.image(tag, picture, dataformats="HWC").value[0] for tag, picture in pictures.items()}
+        self._show("images", made)
 
     def _scalars(self, values: Mapping[str, float]) -> None:
         """Add a point to each curve; ``values`` are by tag, and values that are not finite are left out."""

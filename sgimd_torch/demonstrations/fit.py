@@ -1,4 +1,4 @@
-"""How well a robot can repeat a demonstration: the misfit of eq. (6), and the limits that the demonstration exceeds.
+"""How well a robot can repeat a demonstration: the misfit of eq. (6); times in another unit.
 
 The equation is that of Nguyen & Oudeyer (2014).    misfit_of(rod, theta_d, demonstration)
 """
@@ -38,24 +38,3 @@ def slow_clock(demonstration: Demonstration) -> list[str]:
         return []
     unit = "ms" if step < 1e3 else "us" if step < 1e6 else "ns"
     return [f"lasts {lasts:.2g} s, with {step:.2g} s between samples; are its times in {unit}?"]
-
-
-def beyond_limits(environment: Environment, demonstration: Demonstration) -> list[str]:
-    """Sentences, one for each limit of the robot that a recording exceeds."""
-    remarks, primitive = list[str](), primitive_of(environment)
-    box, trajectory, outcome = primitive.ranges, demonstration.trajectory, demonstration.outcome
-    if box is not None and trajectory.shape[1:] == (box.dim,):
-        outside = (trajectory < box.low) | (trajectory > box.high)
-        for joint in np.flatnonzero(outside.any(axis=0)):
-            sample = int(outside[:, joint].argmax())
-            name = box.names[joint] if box.names else f"joint {joint}"
-            angle = f"{name} is {trajectory[sample, joint]:.3g} at sample {sample}"
-            remarks.append(f"{angle}, outside its range [{box.low[joint]:g}, {box.high[joint]:g}]")
-    remarks += slow_clock(demonstration)
-    shortest, longest = primitive.durations
-    lasts = float(demonstration.times[-1] - demonstration.times[0])
-    if not shortest * (1 - 1e-9) <= lasts <= longest * (1 + 1e-9):
-        remarks.append(f"too {'fast' if lasts < shortest else 'long'}: movements last {shortest:g} to {longest:g} s")
-    if outcome.shape == (environment.outcomes.dim,) and not environment.outcomes.contains(outcome):
-        remarks.append("its outcome is outside T: a learner imitates it, but never takes it as a goal")
-    return remarks

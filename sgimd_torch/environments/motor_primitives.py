@@ -8,11 +8,26 @@ trajectory is translated to the theta that reproduces it most closely (eq. 6).
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from sgimd_torch.environments.protocol import Primitive, check_recording
 from sgimd_torch.spaces import Array, Box, check_count
+
+
+class Controller(Protocol):
+    """An open-loop controller: the commands of a movement depend on its theta alone."""
+
+    @property
+    def policies(self) -> Box:
+        """Pi."""
+        ...
+
+    def at(self, theta: Array, times: Array) -> Array:
+        """Commands ``(n_times, n_commands)`` at ``times`` ``(n_times,)`` s after the start."""
+        ...
 
 
 class GaussianPrimitive(Primitive):

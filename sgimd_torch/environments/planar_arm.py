@@ -6,16 +6,13 @@ arm = PlanarArm(); outcome = arm.execute(arm.observe(rng), theta, rng)
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sgimd_torch.environments.protocol import check_movement, check_recording
+from sgimd_torch.environments.sketch import Sketch
 from sgimd_torch.spaces import Array, Box, check_count, check_rng, check_vector, first_entry
-
-if TYPE_CHECKING:
-    from sgimd_torch.environments.sketch import Sketch
 
 _STEP = 0.04  # time (s) between two drawings of a movement
 _STEPS = 26  # number of drawings of a movement
@@ -73,8 +70,6 @@ class PlanarArm:
 
     def trace(self, context: ArrayLike, theta: ArrayLike, rng: np.random.Generator) -> Sketch:
         """Drawings of a movement: in 1 s all joints turn smoothly from the straight arm to their angles."""
-        from sgimd_torch.environments.sketch import Sketch  # only films need it
-
         context, theta = check_movement(self, context, theta)
         angles, times = self._moved(theta, rng), np.linspace(0, 1, _STEPS)[:, None]
         directions = np.cumsum(times**2 * (3 - 2 * times) * angles, axis=1) + context.sum()

@@ -7,11 +7,9 @@ Section 2.1 of Nguyen & Oudeyer (2014): M(c, theta) = tau. An environment of you
 
 from __future__ import annotations
 
-import os
 import traceback
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, Protocol, TypeGuard, runtime_checkable
 
@@ -203,28 +201,9 @@ def observed(environment: Environment, rng: np.random.Generator) -> Array:
 def tried(name: str, dim: int, robot: Callable[..., ArrayLike], *given: Any) -> Array | Failure:
     """Result of a call of the robot, as ``(dim,)`` finite numbers, read-only, or why there is none."""
     try:
-        with _ending_children():
-            found = robot(*given)
-        return read_only(check_point(name, found, dim))
+        return read_only(check_point(name, robot(*given), dim))
     except (Exception, SystemExit) as error:  # no failure of a robot may end a run or an evaluation
         return Failure(reason_of(error), error)
-
-
-@contextmanager
-def _ending_children() -> Iterator[None]:
-    """A block of the robot; a process that the robot forks ends with it, as only one process may go on with the run."""
-    owner, code = os.getpid(), 0
-    try:
-        yield
-    except BaseException as error:
-        told = error.code if isinstance(error, SystemExit) else 1
-        code = told if isinstance(told, int) else int(told is not None)
-        if os.getpid() != owner and not isinstance(error, SystemExit):
-            traceback.print_exc()
-        raise
-    finally:
-        if os.getpid() != owner:
-            os._exit(code)
 
 
 def reason_of(error: BaseException) -> str:
@@ -253,8 +232,7 @@ def execute_many(
     n, dim = len(thetas), environment.outcomes.dim
     if n > 1 and moves_in_batches(environment):
         try:
-            with _ending_children():
-                outcomes: Any = environment.execute_many(np.array(contexts), np.array(thetas), rngs)
+            outcomes: Any = environment.execute_many(np.array(contexts), np.array(thetas), rngs)
             if (shape := np.shape(outcomes)) != (n, dim):
                 raise ValueError(f"execute_many() must give {n} outcomes in rows, ({n}, {dim}), got {shape}")
         except (Exception, SystemExit) as error:

@@ -1,15 +1,13 @@
-"""Checkpoints of the forward model of a run, which a replay loads instead of training again.
+"""The checkpoint of a run's forward model, which can be loaded instead of training again.
 
-checkpoints = Checkpoints(directory); checkpoints.write("last", model, refresh)
-ForwardModel.load_from_checkpoint(directory / "checkpoints/last.ckpt")  # they are Lightning's
+write_checkpoint(directory, model, refresh); ForwardModel.load_from_checkpoint(directory / CHECKPOINT)  # Lightning's
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import lightning
 import torch
@@ -19,66 +17,44 @@ from sgimd_torch.files import make_folder, replacing
 from sgimd_torch.forward_model.model import ForwardModel
 from sgimd_torch.record import Row, RunError
 
+CHECKPOINT: Final = "checkpoints/last.ckpt"  # in the directory of a run
 
-@dataclass(frozen=True)
-class Checkpoints:
-    """Checkpoints of a run: ``checkpoints/last.ckpt``, and files such as ``checkpoints/000500.ckpt``.
+
+def write_checkpoint(directory: Path, model: ForwardModel, refresh: Row) -> None:
+    """Write the checkpoint of ``model`` after the ``refresh`` with this row in the record of the run in ``directory``.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    checkpoint = {
+        "pytorch-lightning_version": lightning.__version__,
+        "made_by": __version__,
+        "state_dict": model.state_dict(),
+        "hyper_parameters": dict(model.hparams),
+        "refresh": list(refresh),
+        "guides": model.guides,
+    }
+    model.on_save_checkpoint(checkpoint)
+    path = directory / CHECKPOINT
+    make_folder(path.parent)
+    with replacing(path) as partial:
+        torch.save(checkpoint, partial)
+
+
+def read_checkpoint(directory: Path, model: ForwardModel, refreshes: Sequence[Row]) -> dict[str, Any]:
+    """The checkpoint of the run in ``directory``, if it was made at one of these ``refreshes``; {}: there is none.
 
     Args:
         directory: directory of the run.
-        at_evaluations: whether to write one at each evaluation, too.
+        model: model freshly built from the settings of the run.
+        refreshes: first rows of this table in the record of the run.
+
+    Raises:
+        RunError: the checkpoint is damaged, or of another run, robot, network or version.
     """
-
-    directory: Path
-    at_evaluations: bool = False
-
-    def write(self, name: str, model: ForwardModel, refresh: Row) -> None:
-        """Write a checkpoint of ``model`` after the ``refresh`` with this row in the record.
-
-        Raises:
-            OSError: the file cannot be written.
-        """
-        checkpoint = {
-            "pytorch-lightning_version": lightning.__version__,
-            "made_by": __version__,
-            "state_dict": model.state_dict(),
-            "hyper_parameters": dict(model.hparams),
-            "refresh": list(refresh),
-            "guides": model.guides,
-        }
-        model.on_save_checkpoint(checkpoint)
-        make_folder(self.directory / "checkpoints")
-        with replacing(self.directory / "checkpoints" / f"{name}.ckpt") as partial:
-            torch.save(checkpoint, partial)
-
-    def newest(self, model: ForwardModel, refreshes: Sequence[Row], span: tuple[float, float]) -> dict[str, Any]:
-        """The newest checkpoint of a refresh in ``span`` that a replay can load instead of training; {}: none.
-
-        If the model has guided the learner before, each of these movements depends on the model of its time.
-
-        Args:
-            model: model freshly built from the settings of the run.
-            refreshes: rows of this table in the record of the run.
-            span: number of movements, above the first and up to the second.
-
-        Raises:
-            RunError: a checkpoint is damaged, or of another run, robot, network or version.
-        """
-        # "last" comes first, then the evaluations from the last to the first.
-        paths = sorted((self.directory / "checkpoints").glob("*.ckpt"), reverse=True) if span[1] > 0 else []
-        for path in paths:
-            if path.stem == "last" or (path.stem.isdigit() and int(path.stem) <= span[1]):
-                checkpoint = _read(path, model)
-                refresh = tuple(checkpoint["refresh"])
-                if span[0] < refresh[0] <= span[1]:
-                    if refresh not in refreshes:
-                        raise RunError(f"{path} is of another run")
-                    return {} if checkpoint["guides"] else checkpoint
+    path = directory / CHECKPOINT
+    if not refreshes or not path.exists():
         return {}
-
-
-def _read(path: Path, model: ForwardModel) -> dict[str, Any]:
-    """A checkpoint that ``model`` can load; RunError: it cannot."""
     try:
         checkpoint: dict[str, Any] = torch.load(path, map_location="cpu", weights_only=True)
         made_by, made_with, weights = (checkpoint[name] for name in ("made_by", "hyper_parameters", "state_dict"))
@@ -94,4 +70,8 @@ def _read(path: Path, model: ForwardModel) -> dict[str, Any]:
         raise RunError(f"{path} is of another model: {told}")
     if shapes != {name: values.shape for name, values in model.state_dict().items()}:
         raise RunError(f"{path} has weights of other shapes; was the network changed?")
-    return checkpoint
+    if (refresh := tuple(checkpoint["refresh"])) in refreshes:
+        return checkpoint
+    if refresh[0] <= refreshes[-1][0]:
+        raise RunError(f"{path} is of another run")
+    return {}

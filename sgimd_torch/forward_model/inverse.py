@@ -12,10 +12,10 @@ from typing import Any, Final
 import numpy as np
 import torch
 
+from sgimd_torch.calls import with_keywords_of
 from sgimd_torch.forward_model.anchored import Anchored
 from sgimd_torch.forward_model.shared import ModelBased
 from sgimd_torch.inverses.locally_linear import LocallyLinear
-from sgimd_torch.options.signature import with_keywords_of
 from sgimd_torch.parts import Problem
 from sgimd_torch.spaces import Array, Estimate
 

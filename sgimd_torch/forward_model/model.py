@@ -15,6 +15,7 @@ import numpy as np
 import torch
 from lightning import LightningModule
 
+from sgimd_torch.calls import function_of
 from sgimd_torch.forward_model.networks import (
     ACTIVATION,
     LOG_VARIANCES,
@@ -27,7 +28,6 @@ from sgimd_torch.forward_model.networks import (
 )
 from sgimd_torch.forward_model.training import Fit, OnlineTrainer, one_thread
 from sgimd_torch.memory import Memory
-from sgimd_torch.options import function_of
 from sgimd_torch.spaces import Array, check_count, check_vector, stream
 
 TRUSTED_UP_TO: Final = 0.25  # largest relative error of a model that is used
@@ -103,6 +103,7 @@ class ForwardModel(LightningModule):
     n_seen: torch.Tensor  # number of exemplars that were learnt from
     n_scaled: torch.Tensor  # number of exemplars from which the scales were computed
     missed: torch.Tensor  # value of ``relative_error``
+    proved: torch.Tensor  # whether a `ProvedModel` uses the model
 
     def __init__(
         self,
@@ -157,6 +158,7 @@ class ForwardModel(LightningModule):
         self.register_buffer("n_seen", torch.zeros((), dtype=torch.int64))
         self.register_buffer("n_scaled", torch.zeros((), dtype=torch.int64))
         self.register_buffer("missed", torch.zeros(()))
+        self.register_buffer("proved", torch.zeros((), dtype=torch.bool))
 
     @property
     def trained(self) -> bool:
@@ -204,6 +206,11 @@ class ForwardModel(LightningModule):
     def on_load_checkpoint(self, checkpoint: dict[str, Any]) -> None:
         """Lightning's hook: the next refresh goes on as if the model had not been saved."""
         self._online.state = checkpoint["online"]
+
+    def restore(self, checkpoint: dict[str, Any]) -> None:
+        """Go on from a checkpoint of this model."""
+        self.load_state_dict(checkpoint["state_dict"])
+        self.on_load_checkpoint(checkpoint)
 
     def standardised(self, memory: Memory) -> tuple[torch.Tensor, torch.Tensor]:
         """Inputs ``(n, context_dim + theta_dim)`` and outcomes ``(n, outcome_dim)`` to train on."""
@@ -265,8 +272,7 @@ class ForwardModel(LightningModule):
         """
         if self.awaited:
             if len(memory) == int(self.awaited["state_dict"]["n_seen"]):
-                self.load_state_dict(self.awaited["state_dict"])
-                self.on_load_checkpoint(self.awaited)
+                self.restore(self.awaited)
                 self.awaited = {}
             return None
         sizes = {name: getattr(memory, name) for name in self.sizes}

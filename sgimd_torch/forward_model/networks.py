@@ -17,10 +17,9 @@ from typing import Any, ClassVar, Final, NamedTuple
 
 import torch
 
-from sgimd_torch.options import function_of
-from sgimd_torch.options.built import call_checked
-from sgimd_torch.options.catalogue import unknown_name_error
+from sgimd_torch.calls import call_checked, function_of
 from sgimd_torch.spaces import check_count
+from sgimd_torch.texts import unknown_name_error
 
 ACTIVATIONS: Final[dict[str, Callable[[torch.Tensor], torch.Tensor]]] = {
     "silu": torch.nn.functional.silu,

@@ -14,11 +14,11 @@ from typing import Any, Final
 
 import numpy as np
 
+from sgimd_torch.calls import with_keywords_of
 from sgimd_torch.forward_model.inverse import ModelInverse
 from sgimd_torch.forward_model.shared import ModelBased
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.memory import Memory
-from sgimd_torch.options.signature import with_keywords_of
 from sgimd_torch.parts import Inverse, Problem
 from sgimd_torch.spaces import Array, Estimate
 
@@ -50,14 +50,13 @@ class ProvedModel(ModelBased):
         self._rivals = LocalProcess(before), ModelInverse(before)
         # For each movement: its row, the variance that the process predicts, and the errors of process and model.
         self._tests: list[tuple[int, float, float, float]] = []
-        self._proved = False
         self.model.before_learning.append(self._test)
         self.model.guides = True
 
     @property
     def trusted(self) -> bool:
         """Whether the model has passed the test on the newer half of the movements, and its relative error is small."""
-        return self._proved and self.model.trusted
+        return bool(self.model.proved) and self.model.trusted
 
     def __call__(self, context: Array, goal: Array) -> Estimate:
         """The answer, and the exemplars of the nearest outcomes."""
@@ -89,7 +88,7 @@ class ProvedModel(ModelBased):
             if prediction is not None:
                 expected, variance = prediction
                 self._tests.append((row, variance, math.dist(expected, outcome), math.dist(landing, outcome)))
-        self._proved = self._is_nearly_as_good(len(memory))
+        self.model.proved.fill_(self._is_nearly_as_good(len(memory)))
 
     def _is_nearly_as_good(self, n: int) -> bool:
         """Whether the model predicted as well as the process, on recent movements with the least predicted variance."""

@@ -1,6 +1,6 @@
-"""Searches by the gradient of the forward model, towards reliable movements that land nearer to the goal.
+"""A search by the gradient of the forward model, towards reliable movements that land nearer to the goal.
 
-Not in Nguyen & Oudeyer (2014); alternatives to the simplex of section 4.4.2, which needs no model.
+Not in Nguyen & Oudeyer (2014); an alternative to the simplex of section 4.4.2, which needs no model.
     search = GradientSearch(problem); movements = search(estimate, goal); theta = next(movements)
 """
 
@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Generator
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 import torch
 
 from sgimd_torch.forward_model.anchored import Anchored
 from sgimd_torch.forward_model.shared import model_of, uses_model
-from sgimd_torch.options.signature import with_keywords_of
 from sgimd_torch.parts import Problem, Search
 from sgimd_torch.searches.simplex import NelderMead
 from sgimd_torch.spaces import Array, Estimate
@@ -81,26 +80,3 @@ class GradientSearch(Search):
             elif misfit > change:
                 radius = max(radius / 2, _LEAST_RADIUS)
             thetas, outcomes, first = np.vstack([thetas, theta]), np.vstack([outcomes, outcome]), first[:0]
-
-
-class GradientThenNelderMead(Search):
-    """Nelder-Mead simplex that begins at the answer of the gradient search (extra forward).
-
-    The answer is the result of the first descent, which costs no movement. The simplex executes it as its first vertex.
-    Until the model is trusted, the simplex begins at theta_g.
-
-    Args:
-        problem: problem to learn.
-        options: options of `NelderMead`.
-    """
-
-    @with_keywords_of(NelderMead)
-    def __init__(self, problem: Problem, **options: Any) -> None:
-        super().__init__(problem)
-        self.gradient, self.simplex = GradientSearch(problem, noise=0.0), NelderMead(problem, **options)
-
-    def __call__(self, start: Estimate, goal: Array) -> Generator[Array, Array, None]:
-        """Movements around the answer."""
-        if self.gradient.by_model:
-            start = start._replace(theta=next(self.gradient(start, goal)))
-        yield from self.simplex(start, goal)

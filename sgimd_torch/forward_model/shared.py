@@ -6,7 +6,7 @@ A replay writes the tables of the record again, except rows that come before a c
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
 from itertools import islice
 from pathlib import Path
@@ -15,15 +15,16 @@ from typing import Any, Final
 import numpy as np
 from scipy.special import gammaincinv
 
-from sgimd_torch.evaluation import Evaluation
-from sgimd_torch.forward_model.checkpoints import Checkpoints
+from sgimd_torch.calls import with_keywords_of
+from sgimd_torch.forward_model.checkpoints import read_checkpoint, write_checkpoint
 from sgimd_torch.forward_model.model import ForwardModel, Refresh
 from sgimd_torch.memory import Memory
-from sgimd_torch.options.signature import with_keywords_of
+from sgimd_torch.memory.exemplars import Exemplars
 from sgimd_torch.parts import Inverse, Problem, Trained
 from sgimd_torch.record import Record, Row, RunError
-from sgimd_torch.runs.run import Listener, RunLoop, Seconds
-from sgimd_torch.runs.signals import say
+from sgimd_torch.runs.hooks import Listener
+from sgimd_torch.runs.messages import say
+from sgimd_torch.runs.run import RunLoop, Seconds
 from sgimd_torch.spaces import Array, Episode
 
 LEVEL: Final = 0.8  # share of outcomes that the predicted regions should contain, for the board's model/coverage
@@ -48,16 +49,31 @@ class SharedModel(Trained):
 
     def listener(self, loop: RunLoop) -> ModelListener:
         """Listener that refreshes the model in a run."""
-        learner, config = loop.parts.learner, loop.parts.config
-        checkpoints = Checkpoints(config.directory, at_evaluations=config.checkpoints)
-        return ModelListener(loop.record, self.model, learner.inverse, learner.memory, loop.seconds, checkpoints)
+        learner, directory = loop.parts.learner, loop.parts.config.directory
+        return ModelListener(loop.record, self.model, learner.inverse, learner.memory, loop.seconds, directory)
 
-    def restore(self, directory: Path, refreshes: Sequence[Row], span: tuple[float, float]) -> None:
-        """Let a replay load the last usable checkpoint of the run in ``directory`` instead of training."""
+    def restore(self, directory: Path, refreshes: Sequence[Row]) -> None:
+        """Let a replay load the checkpoint of the run in ``directory`` instead of training, unless the model has guided
+        the learner before: each of these movements depends on the model of its time."""
+        checkpoint = self._checkpoint(directory, refreshes)
+        self.model.awaited = {} if checkpoint.get("guides") else checkpoint
+
+    def recall(self, directory: Path, refreshes: Sequence[Row], memory: Memory) -> None:
+        """Bring the model into the state after the last of these ``refreshes``; without its checkpoint, train again."""
+        checkpoint = self._checkpoint(directory, refreshes)
+        if checkpoint and tuple(checkpoint["refresh"]) == refreshes[-1]:
+            self.model.restore(checkpoint)
+            return
+        for _, exemplars, *_ in refreshes:
+            if exemplars > int(self.model.n_seen):
+                self.model.refresh(Exemplars.of(memory, slice(exemplars)).memory)
+
+    def _checkpoint(self, directory: Path, refreshes: Sequence[Row]) -> dict[str, Any]:
         try:
-            self.model.awaited = Checkpoints(directory).newest(self.model, refreshes, span)
+            return read_checkpoint(directory, self.model, refreshes)
         except RunError as error:
             say(f"{error}; the forward model is trained again")
+            return {}
 
 
 _OPTIONS: Final = ("members", "network", "widths", "activation", "lr", "beta", "batch", "rate", "noise_heads")
@@ -95,7 +111,7 @@ def uses_model(inverse: Inverse, model: ForwardModel) -> bool:
 
 
 class ModelListener(Listener):
-    """Refreshes the model after every movement, records its predictions and writes its checkpoints.
+    """Refreshes the model after every movement, records its predictions and writes its checkpoint.
 
     Args:
         record: record of the run.
@@ -103,7 +119,7 @@ class ModelListener(Listener):
         inverse: inverse model of the learner.
         memory: memory of the learner.
         seconds: clock of the run; it includes the training during a replay.
-        checkpoints: checkpoints of the run.
+        directory: directory of the run.
     """
 
     def __init__(
@@ -113,14 +129,13 @@ class ModelListener(Listener):
         inverse: Inverse,
         memory: Memory,
         seconds: Seconds,
-        checkpoints: Checkpoints,
+        directory: Path,
     ) -> None:
         self._record, self._model, self._memory, self._seconds = record, model, memory, seconds
-        self._inverse, self._is_used, self._checkpoints = inverse, False, checkpoints
+        self._inverse, self._is_used, self._directory = inverse, False, directory
         self._curves: dict[str, float] = {}
         self._refresh: Row = ()  # row of the last refresh
         self._written: Row = ()  # row of the refresh in the last checkpoint
-        self._evaluated: tuple[int, Row] = 0, ()
         # Rows that the replay does not compute again, because it loads an awaited checkpoint.
         movements, exemplars, *_ = model.awaited.get("refresh", (0, 0))
         refreshes = [row for row in record.rows("refreshes") if row[0] <= movements]
@@ -159,20 +174,11 @@ class ModelListener(Listener):
             self._curves["time/training_step"] = fit.seconds
             say(*(f"movement {movements}: {message}" for message in news))
 
-    def evaluated(self, movements: int, evaluations: Mapping[str, Evaluation]) -> None:
-        """Remember the moment for a checkpoint."""
-        self._evaluated = movements, self._refresh
-
     def flush(self) -> None:
-        """Write checkpoints of the last refresh, which the record has by now."""
+        """Write a checkpoint of the last refresh, which the record has by now."""
         if self._refresh != self._written:
-            self._checkpoints.write("last", self._model, self._refresh)
+            write_checkpoint(self._directory, self._model, self._refresh)
             self._written = self._refresh
-        movements, refresh = self._evaluated
-        if refresh and refresh == self._refresh:
-            self._evaluated = 0, ()
-            if self._checkpoints.at_evaluations:
-                self._checkpoints.write(f"{movements:06d}", self._model, refresh)
 
     def close(self) -> None:
         """Print a message if the model is not used."""

@@ -20,7 +20,7 @@ from lightning.fabric.accelerators import ACCELERATOR_REGISTRY
 from lightning.fabric.plugins.environments.lightning import LightningEnvironment
 
 from sgimd_torch.forward_model.networks import nll
-from sgimd_torch.options.catalogue import did_you_mean
+from sgimd_torch.texts import did_you_mean
 
 _RECENT: Final = 0.25  # share of every batch that is drawn from the newest exemplars
 _HELD_OUT_EVERY: Final = 10  # every tenth exemplar is held out, that is, never trained on

@@ -11,13 +11,14 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Sequence
-from typing import Final, NamedTuple, ParamSpec, TypeVar
+from typing import Final, ParamSpec, TypeVar
 
 import numpy as np
 from scipy.linalg.lapack import dormqr, dpotrf, dpotri, dpotrs, dsytrd
 from scipy.optimize import minimize
 from threadpoolctl import ThreadpoolController
 
+from sgimd_torch.inverses.tuples import Kernel
 from sgimd_torch.memory.compiled import compiled
 from sgimd_torch.spaces import Array
 
@@ -26,7 +27,7 @@ _LEAST_NOISE: Final = 1e-6  # least noise variance, relative to the kernel's; wi
 _NOISES: Final = (_LEAST_NOISE, 1e-4, 1e-3, 1e-2, 0.03, 0.1, 0.3, 1.0, 3.0)  # of the grid of kernels
 _SCALES: Final = (0.5, 1.0, 2.0)  # of the grid of kernels
 _ROUGH: Final = ((1.0, 0.0), *itertools.product((4.0, 12.0), (0.03, 0.1, 0.3, 0.6)))  # (finer, share) of the grid
-_SMOOTH: Final = np.array([1.0, 1.0, 0.0, 0.0])  # a `Kernel` without rough part
+_SMOOTH: Final = Kernel(1.0, 1.0, 0.0, 0.0)
 _STEPS: Final = 30  # largest number of steps of the fit of lengths
 
 
@@ -39,16 +40,6 @@ def one_thread(function: Callable[Inputs, Output]) -> Callable[Inputs, Output]:
     of the learner `practice` would take twice as long, on sixteen far longer."""
     limited: Callable[Inputs, Output] = _BLAS.wrap(limits=1, user_api="blas")(function)
     return limited
-
-
-class Kernel(NamedTuple):
-    """Kernel of variance 1. ``scale`` multiplies all inputs. The rough part has the ``share`` of the variance, and a
-    length scale that is ``finer`` times shorter. ``noise`` is a variance, relative to the kernel's."""
-
-    scale: float
-    finer: float
-    share: float
-    noise: float
 
 
 def fit_lengths(inputs: Array, outcomes: Array) -> Array:
@@ -100,7 +91,7 @@ def choose_kernel(groups: Sequence[tuple[Array, Array]], noise: float) -> Kernel
             twice or half as large, so other values are less likely, but possible. With 0 there is no noise.
     """
     noises = np.array(_NOISES if noise > 0 else [_LEAST_NOISE])
-    grid = np.array([(scale, *rough, 0.0) for scale, rough in itertools.product(_SCALES, _ROUGH)])
+    grid = [Kernel(scale, *rough, 0.0) for scale, rough in itertools.product(_SCALES, _ROUGH)]
     scores = np.zeros((len(grid), len(noises)))
     kernels = compiled("sgimd_torch.inverses.kernels")
     for inputs, outcomes in groups:
@@ -113,5 +104,4 @@ def choose_kernel(groups: Sequence[tuple[Array, Array]], noise: float) -> Kernel
             reflected = np.concatenate((deviations[:1], others)).T.copy()
             row += kernels.scores(diagonal, beside_diagonal, reflected, noises, float(noise))
     best_row, best_noise = np.unravel_index(scores.argmax(), scores.shape)
-    scale, finer, share, _ = grid[best_row].tolist()
-    return Kernel(scale, finer, share, float(noises[best_noise]))
+    return grid[int(best_row)]._replace(noise=float(noises[best_noise]))

@@ -8,11 +8,12 @@ Import this module through `compiled`: loading numba takes half a second.
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
-from numba import float64
+from numba import float64, types
 
+from sgimd_torch.inverses.tuples import GaussianProcess, Kernel, Movements, Predictions, Question
 from sgimd_torch.memory.jit import (
     LISTS,
     NUMBERS,
@@ -39,29 +40,9 @@ OUTLIERS: Final = 8  # largest number of gross errors among the exemplars of a p
 USUAL: Final = 4.0  # largest squared residual that counts in full when the usual one is computed
 TINY: Final = 1e-300  # guard against 0 where a number is divided or its logarithm is taken
 ROOT5: Final = float(np.sqrt(5))
-
-
-class GaussianProcess(NamedTuple):
-    """Gaussian process, given some movements.
-
-    Attributes:
-        inputs: ``(dim, n)``, theta and context of each movement, in lengths: each divided by its length scale.
-        kernel: ``(4,)``: scale, which multiplies all inputs; finer, how much shorter the length of a second Matern is;
-            share, weight of the second Matern; noise, variance relative to the kernel's.
-        factor: ``(n, n)`` Cholesky factor of the covariance of the movements.
-        noises: ``(n,)``, variance of the noise of each movement, relative to the kernel's.
-        weights: ``(outcome_dim, n)``, inverse covariance times outcomes.
-        mean: ``(outcome_dim,)``, mean outcome.
-        variance: most likely variance, by which the kernel is multiplied.
-    """
-
-    inputs: Array
-    kernel: Array
-    factor: Array
-    noises: Array
-    weights: Array
-    mean: Array
-    variance: float
+KERNEL: Final = types.NamedUniTuple(float64, 4, Kernel)  # type: ignore[no-untyped-call]
+MOVEMENTS: Final = types.NamedTuple([TABLE, TABLE, TABLE, TABLE, NUMBERS, TABLE], Movements)  # type: ignore[no-untyped-call]
+QUESTION: Final = types.NamedTuple([NUMBERS, NUMBERS, LISTS, NUMBERS], Question)  # type: ignore[no-untyped-call]
 
 
 @jit_helper
@@ -72,10 +53,11 @@ def matern(distance: float) -> tuple[float, float]:
 
 
 @jit_helper
-def covariances(inputs: Array, kernel: Array, point: Array, covariance: Array, slope: Array) -> None:
+def covariances(inputs: Array, kernel: Kernel, point: Array, covariance: Array, slope: Array) -> None:
     """Write the covariances of ``point`` ``(dim,)`` with the first ``len(covariance)`` of ``inputs`` ``(dim, n)``, and
     slopes: the derivative of covariance j by the point is slope_j (point - input_j)."""
-    scale, finer, share, n = kernel[0], kernel[1], kernel[2], len(covariance)
+    scale, finer, share, _ = kernel
+    n = len(covariance)
     covariance[:] = 0
     for k in range(len(point)):
         for j in range(n):
@@ -90,8 +72,8 @@ def covariances(inputs: Array, kernel: Array, point: Array, covariance: Array, s
         covariance[j], slope[j] = value, scale**2 * by_distance
 
 
-@compiled_for(TABLE, NUMBERS)
-def covariance_matrix(inputs: Array, kernel: Array) -> tuple[Array, Array]:
+@compiled_for(TABLE, KERNEL)
+def covariance_matrix(inputs: Array, kernel: Kernel) -> tuple[Array, Array]:
     """Covariance matrix ``(n, n)`` of ``inputs`` ``(dim, n)``, without noise, and its slopes, see `covariances`; the
     lower halves alone."""
     n = inputs.shape[1]
@@ -102,8 +84,8 @@ def covariance_matrix(inputs: Array, kernel: Array) -> tuple[Array, Array]:
 
 
 @jit_helper
-def fitted_process(rows: np.ndarray, inputs: Array, outcomes: Array, kernel: Array) -> tuple[GaussianProcess, Array]:
-    """The process of the movements in ``rows``, and its `precisions`; other arguments: see `answer`.
+def fitted_process(rows: np.ndarray, inputs: Array, outcomes: Array, kernel: Kernel) -> tuple[GaussianProcess, Array]:
+    """The process of the movements in ``rows`` of ``inputs`` and ``outcomes``, and its `precisions`.
 
     The movement that all others contradict most gets the noise that explains it, then the next one, until none is
     contradicted. So gross errors, such as those of a camera that loses the object, hardly count. A movement far from
@@ -126,10 +108,10 @@ def fitted_process(rows: np.ndarray, inputs: Array, outcomes: Array, kernel: Arr
 
 
 @jit_helper
-def process_with(inputs: Array, outcomes: Array, kernel: Array, covariance: Array) -> GaussianProcess:
+def process_with(inputs: Array, outcomes: Array, kernel: Kernel, covariance: Array) -> GaussianProcess:
     """The process of movements with this ``covariance`` ``(n, n)``, without noise, the lower half alone."""
     m, n = outcomes.shape
-    factor, weights, mean, variance = factorised(covariance, kernel[3]), np.empty((m, n)), np.empty(m), 0.0
+    factor, weights, mean, variance = factorised(covariance, kernel.noise), np.empty((m, n)), np.empty(m), 0.0
     for k in range(m):
         mean[k] = outcomes[k].sum() / n
         for j in range(n):
@@ -137,7 +119,7 @@ def process_with(inputs: Array, outcomes: Array, kernel: Array, covariance: Arra
         solve_lower(factor, weights[k])
         variance += weights[k] @ weights[k] / (n * m)
         solve_transposed(factor, weights[k])
-    return GaussianProcess(inputs, kernel, factor, np.full(n, kernel[3]), weights, mean, max(variance, TINY))
+    return GaussianProcess(inputs, kernel, factor, np.full(n, kernel.noise), weights, mean, max(variance, TINY))
 
 
 @jit_helper
@@ -219,39 +201,33 @@ def expected_error(process: GaussianProcess, goal: Array, inflation: float, cova
 
 
 @jit_helper
-def in_lengths(theta: Array, context: Array, scaling: Array) -> Array:
-    """Input ``(dim,)`` of the process; ``scaling`` ``(2, dim)``: origin and length scale of each."""
-    point, t = np.empty(scaling.shape[1]), len(theta)
+def in_lengths(theta: Array, context: Array, units: Array) -> Array:
+    """Input ``(dim,)`` of the process, see `Movements`."""
+    point, t = np.empty(units.shape[1]), len(theta)
     for k in range(len(point)):
-        point[k] = ((theta[k] if k < t else context[k - t]) - scaling[0, k]) / scaling[1, k]
+        point[k] = ((theta[k] if k < t else context[k - t]) - units[0, k]) / units[1, k]
     return point
 
 
 @jit_helper
 def descend(
-    process: GaussianProcess,
-    start: Array,
-    context: Array,
-    goal: Array,
-    inflation: float,
-    scaling: Array,
-    spreads: Array,
-    box: Array,
+    process: GaussianProcess, start: Array, question: Question, known: Movements, inflation: float
 ) -> tuple[float, Array]:
     """Least expected squared error, and its theta, after damped Gauss-Newton steps from ``start`` ``(theta_dim,)``.
     Steps end when they do not help; they have the least norm, so unimportant parameters hardly change."""
+    context, goal, units, spreads, box = question.context, question.goal, known.units, known.spreads, known.box
     n, t, m = process.inputs.shape[1], len(start), len(goal)
     least, best = np.inf, start
     covariance, slope = np.empty((1 + len(DAMPINGS), n)), np.empty((1 + len(DAMPINGS), n))
     tried, jacobian = np.empty((len(DAMPINGS), t)), np.empty((m, t))
-    covariances(process.inputs, process.kernel, in_lengths(best, context, scaling), covariance[0], slope[0])
+    covariances(process.inputs, process.kernel, in_lengths(best, context, units), covariance[0], slope[0])
     for _ in range(STEPS):
-        point = in_lengths(best, context, scaling)
+        point = in_lengths(best, context, units)
         for k in range(m):
             weighted_slopes = process.weights[k] * slope[0]
             weighted_inputs = process.inputs @ weighted_slopes
             for i in range(t):
-                jacobian[k, i] = (point[i] * weighted_slopes.sum() - weighted_inputs[i]) * spreads[i] / scaling[1, i]
+                jacobian[k, i] = (point[i] * weighted_slopes.sum() - weighted_inputs[i]) * spreads[i] / units[1, i]
         residual, gram = goal - expected(process, covariance[0]), jacobian @ jacobian.T
         mean_gram, best_try = np.trace(gram) / m + TINY, 0  # best_try 0: no try is better
         for d in range(len(DAMPINGS)):
@@ -260,7 +236,7 @@ def descend(
             step = pull @ jacobian
             for i in range(t):
                 tried[d, i] = min(max(best[i] + spreads[i] * step[i], box[0, i]), box[1, i])
-            point = in_lengths(tried[d], context, scaling)
+            point = in_lengths(tried[d], context, units)
             covariances(process.inputs, process.kernel, point, covariance[1 + d], slope[1 + d])
             error = expected_error(process, goal, inflation, covariance[1 + d], least)
             if error < least:
@@ -273,95 +249,70 @@ def descend(
     return least, best
 
 
-@compiled_for(LISTS, TABLE, TABLE, TABLE, NUMBERS, NUMBERS, NUMBERS, NUMBERS, TABLE, NUMBERS, TABLE)
-def answer(
-    alike: np.ndarray,
-    inputs: Array,
-    thetas: Array,
-    outcomes: Array,
-    context: Array,
-    goal: Array,
-    kernel: Array,
-    linear: Array,
-    scaling: Array,
-    spreads: Array,
-    box: Array,
-) -> tuple[Array, Array, float]:
+@compiled_for(QUESTION, MOVEMENTS, KERNEL)
+def answer(question: Question, known: Movements, kernel: Kernel) -> tuple[Array, Array, float]:
     """theta of the candidate with the least expected squared error, noise included, its expected outcome, and the
     standard deviation of the outcome from it.
 
     Each start has a process of its own, of the movements most like it, and with it a variance and a noise of its own.
     So a slow movement is preferred to a fast one that cannot be repeated. Candidates are each start, the end of steps
     from it, and the answer of `LocallyLinear`, judged by the process of the first start.
-
-    Args:
-        alike: ``(starts, k)``, rows of the movements most like each start, the start itself first.
-        inputs: ``(n, dim)``, all movements in memory, in lengths.
-        thetas, outcomes: ``(n, theta_dim)`` and ``(n, outcome_dim)``, all movements in memory.
-        context, goal: question.
-        kernel: ``(4,)``, see `GaussianProcess`.
-        linear: ``(theta_dim,)``, answer of `LocallyLinear`.
-        scaling: ``(2, dim)``, see `in_lengths`.
-        spreads: ``(theta_dim,)``, standard deviation of each parameter in memory, the unit of the steps.
-        box: ``(2, theta_dim)``, corners of the box around all thetas.
     """
+    context, goal, alike, linear = question
     m, (n_starts, k) = len(goal), alike.shape
     covariance, slope = np.empty(k), np.empty(k)
     least, best, outcome, sd = np.inf, linear, goal, 0.0
     for start in range(n_starts):
-        if start == 0 or k < len(inputs):  # else the process of all movements serves every start
+        if start == 0 or k < len(known.inputs):  # else the process of all movements serves every start
             rows = alike[start]
-            process, precision = fitted_process(rows, inputs, outcomes, kernel)
+            process, precision = fitted_process(rows, known.inputs, known.outcomes, kernel)
         surprise = 0.0  # mean squared residual near the start
         for row in alike[start, :JUDGED]:
             j = int(np.argmax(rows == row))
             surprise += squared_residual(process, j, precision[j]) / min(JUDGED, k)
         inflation = m * max(1.0, surprise)
-        scatter = inflation * process.variance * kernel[3]
+        scatter = inflation * process.variance * kernel.noise
         row = alike[start, 0]
-        theta, j = thetas[row], int(np.argmax(rows == row))
+        theta, j = known.thetas[row], int(np.argmax(rows == row))
         if len(context):
-            covariances(process.inputs, kernel, in_lengths(theta, context, scaling), covariance, slope)
+            covariances(process.inputs, kernel, in_lengths(theta, context, known.units), covariance, slope)
             error = expected_error(process, goal, inflation, covariance, np.inf)
         else:  # posterior of its outcome without noise, given itself and all others
             noise = process.noises[j]
             error = inflation * process.variance * noise * max(1 - noise * precision[j], 0.0)
             for i in range(m):
-                error += (outcomes[row, i] - noise * process.weights[i, j] - goal[i]) ** 2
+                error += (known.outcomes[row, i] - noise * process.weights[i, j] - goal[i]) ** 2
         if start == 0:
-            covariances(process.inputs, kernel, in_lengths(linear, context, scaling), covariance, slope)
+            covariances(process.inputs, kernel, in_lengths(linear, context, known.units), covariance, slope)
             error_of_linear = expected_error(process, goal, inflation, covariance, error)
             if error_of_linear < error:
                 error, theta = error_of_linear, linear
-        error_of_end, end = descend(process, thetas[row], context, goal, inflation, scaling, spreads, box)
+        error_of_end, end = descend(process, known.thetas[row], question, known, inflation)
         if error_of_end < error:
             error, theta = error_of_end, end
         if error + scatter < least:
             least, best = error + scatter, theta.copy()
-            covariances(process.inputs, kernel, in_lengths(best, context, scaling), covariance, slope)
+            covariances(process.inputs, kernel, in_lengths(best, context, known.units), covariance, slope)
             outcome, variance = expected(process, covariance), variance_at(process, covariance)
-            sd = np.sqrt(max(1.0, surprise) * (variance + process.variance * kernel[3]))
+            sd = np.sqrt(max(1.0, surprise) * (variance + process.variance * kernel.noise))
     return best.copy(), outcome.copy(), sd
 
 
-@compiled_for(TABLE, TABLE, ROWS, NUMBERS)
-def gross_errors(inputs: Array, outcomes: Array, rows: np.ndarray, kernel: Array) -> np.ndarray:
+@compiled_for(TABLE, TABLE, ROWS, KERNEL)
+def gross_errors(inputs: Array, outcomes: Array, rows: np.ndarray, kernel: Kernel) -> np.ndarray:
     """Whether each movement in ``rows`` is a gross error, see `fitted_process`."""
-    return fitted_process(rows, inputs, outcomes, kernel)[0].noises > kernel[3]
+    return fitted_process(rows, inputs, outcomes, kernel)[0].noises > kernel.noise
 
 
-@compiled_for(TABLE, TABLE, LISTS, TABLE, NUMBERS)
-def predictions(
-    inputs: Array, outcomes: Array, near: np.ndarray, points: Array, kernel: Array
-) -> tuple[Array, Array, Array, Array]:
-    """Expected outcomes ``(n, outcome_dim)`` of movements, their variances ``(n,)`` without noise, those of noise, and
-    the slopes of the outcomes by the inputs, ``(n, outcome_dim, dim)``.
+@compiled_for(TABLE, TABLE, LISTS, TABLE, KERNEL)
+def predictions(inputs: Array, outcomes: Array, near: np.ndarray, points: Array, kernel: Kernel) -> Predictions:
+    """Predictions of movements.
 
     Args:
         inputs, outcomes: ``(rows, dim)``, in lengths, and ``(rows, outcome_dim)``, exemplars.
         near: ``(n, k)``, rows of the exemplars from which each movement is predicted.
         points: ``(n, dim)``, the movements in lengths.
-        kernel: ``(4,)``, see `GaussianProcess`.
+        kernel: kernel.
     """
     n, m, dim = len(points), outcomes.shape[1], points.shape[1]
     outcome, variances, noises, slopes = np.empty((n, m)), np.empty(n), np.empty(n), np.empty((n, m, dim))
@@ -370,7 +321,7 @@ def predictions(
         rows, point = near[i].copy(), points[i].copy()
         process, _ = fitted_process(rows, inputs, outcomes, kernel)
         covariances(process.inputs, kernel, point, covariance, slope)
-        variances[i], noises[i] = variance_at(process, covariance), process.variance * kernel[3]
+        variances[i], noises[i] = variance_at(process, covariance), process.variance * kernel.noise
         means = expected(process, covariance)
         for k in range(m):
             outcome[i, k] = means[k]
@@ -378,7 +329,7 @@ def predictions(
             weighted_inputs, total = process.inputs @ weighted_slopes, weighted_slopes.sum()
             for d in range(dim):
                 slopes[i, k, d] = point[d] * total - weighted_inputs[d]
-    return outcome, variances, noises, slopes
+    return Predictions(outcome, variances, noises, slopes)
 
 
 @compiled_for(NUMBERS, NUMBERS, TABLE, NUMBERS, float64)

@@ -16,11 +16,12 @@ import numpy as np
 from sgimd_torch.inverses.gaussian_process import choose_kernel, fit_lengths, one_thread
 from sgimd_torch.inverses.locally_linear import NEAR, LocallyLinear
 from sgimd_torch.inverses.nearest import near_goal
+from sgimd_torch.inverses.tuples import Kernel, Movements, Predictions, Question
 from sgimd_torch.memory.compiled import compiled
+from sgimd_torch.memory.growing import Growing
 from sgimd_torch.memory.neighbours import Neighbours, Rows
-from sgimd_torch.memory.table import Table
 from sgimd_torch.parts import Inverse, Problem
-from sgimd_torch.spaces import Array, Estimate, stream
+from sgimd_torch.spaces import Array, Estimate, read_only, stream
 
 _FIRST: Final = 16  # number of exemplars at the first fit
 _GROWTH: Final = 1.5  # factor of the number of exemplars from fit to fit
@@ -33,19 +34,17 @@ _FAR: Final = 1e3  # distance from 0, in standard deviations, beyond which input
 
 
 class FittedKernel(NamedTuple):
-    """Exemplars in lengths, ``(n, dim)``; origin and size of a length ``(2, dim)``; kernel ``(4,)``, see `Kernel`."""
+    """Exemplars in lengths, ``(n, dim)``; origin and size of a length ``(2, dim)``; kernel."""
 
     inputs: Neighbours
     units: Array
-    kernel: Array
+    kernel: Kernel
 
 
-def predictions(
-    inputs: Neighbours, outcomes: Array, near: Rows, points: Array, kernel: Array
-) -> tuple[Array, Array, Array, Array]:
+def predictions(inputs: Neighbours, outcomes: Array, near: Rows, points: Array, kernel: Kernel) -> Predictions:
     """Result of `kernels.predictions`."""
     kernels = compiled("sgimd_torch.inverses.kernels")
-    predicted: tuple[Array, Array, Array, Array] = kernels.predictions(inputs.keys.rows, outcomes, near, points, kernel)
+    predicted: Predictions = kernels.predictions(inputs.keys.rows, outcomes, near, points, kernel)
     return predicted
 
 
@@ -65,7 +64,7 @@ class LocalProcess(Inverse):
         self.memory, self.noise = problem.memory, problem.outcome_noise
         self._linear = LocallyLinear(problem)
         self._due = float(_FIRST)  # exemplars at the next fit
-        self._kernel: Array | None = None  # a `Kernel`; None while all outcomes are equal
+        self._kernel: Kernel | None = None  # None while all outcomes are equal
         self._answered: tuple[int, dict[bytes, Estimate]] = 0, {}  # answers by context and goal, at this many exemplars
 
     def __call__(self, context: Array, goal: Array) -> Estimate:
@@ -88,19 +87,10 @@ class LocalProcess(Inverse):
         linear, _ = self._linear.correct(near, goal)
         inputs, kernels = self._inputs.keys.rows, compiled("sgimd_torch.inverses.kernels")
         alike = self._inputs.nearest(inputs[near[: kernels.STARTS]], _MOST_ALIKE)
-        theta, expected, sd = kernels.answer(
-            alike,
-            inputs,
-            memory.thetas,
-            memory.outcomes,
-            context,
-            goal,
-            self._kernel,
-            linear,
-            self._units,
-            self._spreads,
-            memory.theta_range,
-        )
+        question = Question(*map(read_only, (context, goal, alike, linear)))
+        units = self._units, self._spreads, read_only(memory.theta_range)
+        known = Movements(inputs, memory.thetas, memory.outcomes, *units)
+        theta, expected, sd = kernels.answer(question, known, self._kernel)
         return Estimate(theta, thetas, memory.outcomes[near], context, expected, sd)
 
     def predict(self, context: Array, theta: Array) -> Array | None:
@@ -146,15 +136,15 @@ class LocalProcess(Inverse):
         unscaled = np.concatenate((self.memory.thetas[:n], self.memory.contexts[:n]), axis=1)
         outcomes = self.memory.outcomes[:n]
         origin = np.where(np.abs(unscaled[0]) > far * _spreads(unscaled), unscaled[0], 0.0)
-        self._spreads = _spreads(unscaled - origin)
+        self._spreads = read_only(_spreads(unscaled - origin))
         if not np.ptp(outcomes, axis=0).any():
             return
         order = stream(n, "fit of a local process").permutation(n)
         standard, gross = (unscaled - origin) / self._spreads, order[:0]
         for last in (False, True):  # at last without gross errors
             drawn = order[:_FITTED]
-            self._units = np.stack((origin, self._spreads * fit_lengths(standard[drawn], outcomes[drawn])))
-            self._inputs = Neighbours(Table(unscaled.shape[1], self._scaled(0)[:n]))
+            self._units = read_only(np.stack((origin, self._spreads * fit_lengths(standard[drawn], outcomes[drawn]))))
+            self._inputs = Neighbours(Growing(unscaled.shape[1], self._scaled(0)[:n]))
             inputs = self._inputs.keys.rows
             groups = [rows[~np.isin(rows, gross)] for rows in self._inputs.nearest(inputs[order[:_GROUPS]], _GROUP)]
             if last or not len(gross := np.concatenate([self._gross(outcomes, rows) for rows in groups])):
@@ -165,12 +155,12 @@ class LocalProcess(Inverse):
             order = left
         varied = [rows for rows in groups if np.ptp(outcomes[rows], axis=0).any()]
         if varied:
-            self._kernel = np.array(choose_kernel([(inputs[rows], outcomes[rows]) for rows in varied], self.noise))
+            self._kernel = choose_kernel([(inputs[rows], outcomes[rows]) for rows in varied], self.noise)
 
     def _gross(self, outcomes: Array, rows: Rows) -> Rows:
         """Those of ``rows`` that are gross errors to a smooth process; a rough one would explain them."""
         noise = self.noise**2 / (float(outcomes[rows].var(axis=0).mean()) or 1.0)
-        kernels, kernel = compiled("sgimd_torch.inverses.kernels"), np.array([1, 1, 0, min(max(noise, _LITTLE), 1.0)])
+        kernels, kernel = compiled("sgimd_torch.inverses.kernels"), Kernel(1.0, 1.0, 0.0, min(max(noise, _LITTLE), 1.0))
         return rows[kernels.gross_errors(self._inputs.keys.rows, outcomes, rows, kernel)]
 
     def _scaled(self, first: int) -> Array:

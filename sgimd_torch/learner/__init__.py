@@ -7,20 +7,21 @@ autonomous and a social one. The caller owns the loop: ``move = learner.ask(cont
 for a goal. ``learner.listeners.append(print)`` prints every event.
 
 Several robots move at once by ``moves = learner.ask_many(contexts)`` and ``learner.tell_many(outcomes)``. Robot k has
-place k of the learner, where its attempts go on. All robots share one memory, its goal models and one record.
+slot k of the learner, where its attempts go on. All robots share one memory, its goal models and one record.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any, NoReturn, Protocol
+from typing import Any, NamedTuple, NoReturn, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from sgimd_torch.learner.events import Change, Event, Kind
 from sgimd_torch.learner.slots import RobotSlot
+from sgimd_torch.memory.exemplars import Exemplars
 from sgimd_torch.parts import Inverse, Problem, Social, Strategy
 from sgimd_torch.spaces import Array, Demonstration, Failure, Lesson, Move, Request, check_point, read_only
 
@@ -29,13 +30,32 @@ Correspondence = Callable[[Array, Array], Array]
 
 
 class Watcher(Protocol):
-    """Notices changes of the robot, see `sgimd_torch.changes`."""
+    """Watches all movements; if its robot has changed, a learner begins again."""
 
     def expect(self, context: Array, theta: Array, outcome: Array) -> None:
         """Compare an outcome, which is not in memory yet, with what is expected."""
 
-    def restart_if_changed(self) -> tuple[Learner, Change | None] | None:
-        """A learner to go on as, and the change if a new one was noticed; None to go on."""
+    def restart_if_changed(self) -> Restart | None:
+        """What to begin again with; None to go on."""
+
+    def begin_again(self, exemplars: Exemplars, n: int) -> Learner:
+        """The learner of a `Restart` after ``n`` exemplars in all, whose memory has these ``exemplars``."""
+
+
+class Restart(NamedTuple):
+    """How a learner begins again.
+
+    Attributes:
+        learner: learner to go on as; its memory has the exemplars ``kept``, then those since the change.
+        kept: exemplars of before that still help, as they would be now.
+        since: row, in the memory of all exemplars, of the first one since the change.
+        change: change that was noticed now; None: an earlier one.
+    """
+
+    learner: Learner
+    kept: Exemplars
+    since: int
+    change: Change | None
 
 
 class Learner:
@@ -78,7 +98,7 @@ class Learner:
         self.begun, self.seed, self.movements = len(self.memory), problem.seed, 0
         self.watcher: Watcher | None = None
         self.changes: list[Change] = []
-        self._life: list[tuple[int, int] | Event] = []  # events; for a movement, its row in memory and its place
+        self._life: list[tuple[int, int] | Event] = []  # events; for a movement, its row in memory and its robot
         self._slots = [RobotSlot(0)]
         self._new: list[RobotSlot] = []  # slots whose attempt no event has reported so far, in order of beginning
         self._asked: list[tuple[RobotSlot, Move | Failure | None]] = []  # what was asked for and is not told so far
@@ -89,18 +109,18 @@ class Learner:
         """Whether no attempt is under way; then the next ``ask`` begins one, in any context."""
         return all(slot.attempt is None for slot in self._slots)
 
-    def lesson_waits_at(self, place: int) -> bool:
-        """Whether the demonstration that was offered to the robot at ``place`` is still unanswered."""
-        return self._slot(place).offered_at == self.movements
+    def lesson_waits_for(self, robot: int) -> bool:
+        """Whether the demonstration that was offered to this ``robot`` is still unanswered."""
+        return self._slot(robot).offered_at == self.movements
 
     @property
     def regions(self) -> Sequence[Any]:
         """Current regions of the goal model; none if it has no regions."""
         return self.autonomous.regions
 
-    def context_at(self, place: int) -> Array | None:
-        """Context of the attempt under way at ``place``, read-only; None: the next attempt there may have any."""
-        slot = self._slot(place)
+    def context_of(self, robot: int) -> Array | None:
+        """Context of the attempt of this ``robot`` under way, read-only; None: its next attempt may have any."""
+        slot = self._slot(robot)
         return None if slot.attempt is None else slot.context
 
     def events(self) -> Iterator[Event]:
@@ -110,9 +130,9 @@ class Learner:
             if isinstance(entry, Event):
                 yield entry
             else:
-                row, place = entry
+                row, robot = entry
                 context, theta, outcome = memory.contexts[row], memory.thetas[row], memory.outcomes[row]
-                yield Event(Kind.MOVED, context, theta, outcome=outcome, place=place)
+                yield Event(Kind.MOVED, context, theta, outcome=outcome, robot=robot)
         yield from self._beginnings([slot for slot, move in self._asked if not isinstance(move, Failure)])
 
     def __reduce__(self) -> NoReturn:
@@ -133,7 +153,7 @@ class Learner:
 
         Args:
             contexts: context ``(context_dim,)`` of each robot, or its `Failure` if it could not see one. An attempt
-                keeps its context, see `context_at`.
+                keeps its context, see `context_of`.
 
         Returns:
             For each robot its movement. None: it rests, or has no context.
@@ -154,7 +174,7 @@ class Learner:
             context if isinstance(context, Failure) else check_point("context", context, dim) for context in contexts
         ]
         for number, context in enumerate(checked):
-            under_way = self.context_at(number)
+            under_way = self.context_of(number)
             differs = under_way is not None and not isinstance(context, Failure) and (context != under_way).any()
             if differs:
                 raise RuntimeError(f"the attempt under way began in context {under_way}, got {context}; see idle")
@@ -162,34 +182,34 @@ class Learner:
         self._asked = [(slot, self._propose(slot, context)) for slot, context in zip(slots, checked, strict=True)]
         return [move if isinstance(move, Move) else None for _, move in self._asked]
 
-    def request(self, context: ArrayLike, *, place: int = 0) -> Request | None:
+    def request(self, context: ArrayLike, *, robot: int = 0) -> Request | None:
         """The request to a teacher before the next movement, or None. `watch` replies with a demonstration; after
         `go_on_alone`, or after `ask` at once, the request stays without a demonstration.
 
         Args:
             context: ``(context_dim,)``, the context of a new attempt if none is under way.
-            place: number of the robot.
+            robot: number of the robot.
 
         Raises:
             ValueError: the context has another shape, or is not finite.
         """
         context = check_point("context", context, self.memory.context_dim)
-        slot = self._slot(place)
+        slot = self._slot(robot)
         if slot.attempt is None:
             self._begin(slot, context)
         return slot.request
 
-    def go_on_alone(self, reply: str, *, place: int = 0) -> None:
+    def go_on_alone(self, reply: str, *, robot: int = 0) -> None:
         """Tell the learner that its request gets no demonstration.
 
         Args:
             reply: reason, for the record.
-            place: number of the robot with the request.
+            robot: number of the robot with the request.
 
         Raises:
             RuntimeError: the learner has made no request.
         """
-        slot = self._slot(place)
+        slot = self._slot(robot)
         if slot.request is None:
             raise RuntimeError("go_on_alone() needs a request, but request() has given none")
         asked = slot.asked(slot.request, reply)
@@ -228,29 +248,29 @@ class Learner:
             self._tell(slot, move if isinstance(move, Move) else None, outcome)
         self._restart_if_changed()
 
-    def replace_theta(self, theta: Array, *, place: int = 0) -> None:
-        """Replace the movement that is asked for at ``place`` by the recorded ``theta``, which equals it but for
+    def replace_theta(self, theta: Array, *, robot: int = 0) -> None:
+        """Replace the movement that is asked for of a ``robot`` by the recorded ``theta``, which equals it but for
         rounding. Only a replay does this: the memory then holds what was executed."""
-        slot, move = self._asked[place]
+        slot, move = self._asked[robot]
         assert isinstance(move, Move)
-        self._asked[place] = slot, replace(move, theta=theta)
+        self._asked[robot] = slot, replace(move, theta=theta)
 
-    def watch(self, demonstration: Demonstration, *, who: str | None = None, place: int = 0) -> None:
+    def watch(self, demonstration: Demonstration, *, who: str | None = None, robot: int = 0) -> None:
         """Watch a demonstration. A requested demonstration goes to the attempt that requested it. Any other
         demonstration ends the attempt under way, and the social strategy begins with the next ``ask``.
 
         Args:
             demonstration: demonstration that is shown.
-            who: name of the teacher whose offers a `run` checks before each movement, see `lesson_waits_at`; None: the
+            who: name of the teacher whose offers a `run` checks before each movement, see `lesson_waits_for`; None: the
                 demonstration comes from somebody else.
-            place: number of the robot that uses the demonstration; attempts of other robots go on.
+            robot: number of the robot that uses the demonstration; attempts of other robots go on.
 
         Raises:
             RuntimeError: this learner has no social strategy, or the outcome of the last movement was not told.
             ValueError: the demonstration does not fit the spaces or the correspondence, or theta_d lies outside Pi;
                 the learner is unchanged.
         """
-        slot = self._slot(place)
+        slot = self._slot(robot)
         if self.social is None and slot.request is None:
             raise RuntimeError("this learner has no social strategy, so it cannot be taught; use no teacher")
         if self._asked:
@@ -268,7 +288,7 @@ class Learner:
             slot.offered_at = -1 if who is None else self.movements
             context = np.asarray(demonstration.context, dtype=np.float64)
             slot.begin(self.social.attempt(context, theta_d, demonstration), context)
-        self._publish(Event(Kind.SHOWN, lesson=demonstration, who=who, place=place))
+        self._publish(Event(Kind.SHOWN, lesson=demonstration, who=who, robot=robot))
 
     def add(self, context: ArrayLike, theta: ArrayLike, outcome: ArrayLike) -> None:
         """Remember a movement that this learner has not proposed, such as one by another program: its ``context``
@@ -338,14 +358,14 @@ class Learner:
             return
         self._report_new(*(slot for slot, _ in asked))
         stopped = [
-            Event(Kind.INTERRUPTED, slot.context, place=slot.number)
+            Event(Kind.INTERRUPTED, slot.context, robot=slot.number)
             if move is None
             else slot.moved(Kind.INTERRUPTED, move)
             for slot, move in asked
         ]
         for slot in self._slots:
             slot.end()
-        self._publish(*(stopped or [Event(Kind.INTERRUPTED, place=-1)]))
+        self._publish(*(stopped or [Event(Kind.INTERRUPTED, robot=-1)]))
 
     def _slot(self, number: int) -> RobotSlot:
         while len(self._slots) <= number:
@@ -365,7 +385,7 @@ class Learner:
             if slot.attempt is None:
                 self._begin(slot, context)
             while slot.request is not None:
-                self.go_on_alone("nothing", place=slot.number)
+                self.go_on_alone("nothing", robot=slot.number)
             if slot.attempt is not None:
                 return self._within_pi(slot.move)
         raise RuntimeError(f"{type(self.autonomous).__name__}.attempt() has to yield at least once")
@@ -395,13 +415,13 @@ class Learner:
         """Tell what came of the movement of one robot, after its check."""
         self.movements += 1
         if isinstance(outcome, Failure):
-            lost = Event(Kind.FAILED, reply=outcome.reason, place=slot.number)
+            lost = Event(Kind.FAILED, reply=outcome.reason, robot=slot.number)
             failed = lost if move is None else slot.moved(Kind.FAILED, move, reply=outcome.reason)
             slot.end()
             self._publish(failed)
         elif move is None or outcome is None:
             slot.advance(None)
-            self._publish(Event(Kind.RESTED, slot.context, place=slot.number))
+            self._publish(Event(Kind.RESTED, slot.context, robot=slot.number))
         else:
             assert slot.context is not None
             self._remember(slot.context, move.theta, outcome)
@@ -423,15 +443,20 @@ class Learner:
             return
         for slot in self._slots:
             slot.end()
-        new, change = restart
-        self.problem, self.inverse, self.autonomous, self.social = new.problem, new.inverse, new.autonomous, new.social
-        if change is not None:
-            self.changes.append(change)
-            self._publish(Event(Kind.CHANGED, reply=str(change)))
+        self.go_on_as(restart.learner)
+        self._publish(Event(Kind.RESTARTED, since=restart.since, kept=restart.kept))
+        if restart.change is not None:
+            self.changes.append(restart.change)
+            self._publish(Event(Kind.CHANGED, reply=str(restart.change)))
+
+    def go_on_as(self, other: Learner) -> None:
+        """Take the problem and all parts of a learner that has begun again."""
+        self.problem, self.inverse, self.autonomous = other.problem, other.inverse, other.autonomous
+        self.social = other.social
 
     def _publish(self, *events: Event, row: int | None = None) -> None:
         for event in events:
-            self._life.append(event if row is None else (row, event.place))
+            self._life.append(event if row is None else (row, event.robot))
             for listener in self.listeners:
                 listener(event)
 
@@ -446,7 +471,7 @@ class Learner:
         A replay begins attempts in the order of the events, so that each draws the same random numbers again.
         """
         in_order = self._new == [slot for slot in reported if slot in self._new]
-        return [] if in_order else [Event(Kind.ASKED, slot.context, place=slot.number) for slot in self._new]
+        return [] if in_order else [Event(Kind.ASKED, slot.context, robot=slot.number) for slot in self._new]
 
 
 def _lesson_key(demonstration: Demonstration, theta_d: Array) -> tuple[bytes, bytes]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from enum import StrEnum
 from typing import Final, NamedTuple
 
+from sgimd_torch.memory.exemplars import Exemplars
 from sgimd_torch.spaces import Array, Demonstration, Request
 
 TEACHER: Final = "teacher"
@@ -19,9 +20,10 @@ class Kind(StrEnum):
     SHOWN = "shown"
     ASKED = "asked"  # request; ``reply`` is its result, and after "shown" the next event is the demonstration
     ADDED = "added"  # exemplar of a movement that the learner has not proposed
+    RESTARTED = "restarted"  # the learner began again with the exemplars ``kept``, then those from row ``since`` on
     CHANGED = "changed"  # a change of the robot was noticed, ``reply`` describes it; a replay notices it again
     FAILED = "failed"  # movement without an outcome, for the reason ``reply``; if theta is None, no context was seen
-    INTERRUPTED = "interrupted"  # interruption by the caller, before an outcome was told; place -1: between movements
+    INTERRUPTED = "interrupted"  # interruption by the caller, before an outcome was told; robot -1: between movements
 
 
 class Change(NamedTuple):
@@ -43,8 +45,8 @@ class Change(NamedTuple):
 
 
 class Event(NamedTuple):
-    """An event, with the fields of its kind; ``who`` is the teacher who has shown something or was asked, ``place`` the
-    number of the robot if several robots move at once."""
+    """An event, with the fields of its kind; ``who`` is the teacher who has shown something or was asked, ``robot`` the
+    number of the robot if several move at once; ``since`` and ``kept`` are of a restart."""
 
     kind: Kind
     context: Array | None = None
@@ -56,7 +58,9 @@ class Event(NamedTuple):
     who: str | None = None
     strategy: str | None = None
     reply: str | None = None
-    place: int = 0
+    robot: int = 0
+    since: int | None = None
+    kept: Exemplars | None = None
 
 
 class BeforeMovement(NamedTuple):

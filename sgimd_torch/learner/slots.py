@@ -61,8 +61,8 @@ class RobotSlot:
     def asked(self, request: Request, reply: str) -> Event:
         """Event of a request and its reply."""
         goal, who, strategy = request.goal, request.teacher, request.strategy
-        return Event(Kind.ASKED, self.context, goal=goal, who=who, strategy=strategy, reply=reply, place=self.number)
+        return Event(Kind.ASKED, self.context, goal=goal, who=who, strategy=strategy, reply=reply, robot=self.number)
 
     def moved(self, kind: Kind, move: Move, outcome: Array | None = None, reply: str | None = None) -> Event:
         """Event of a movement, with the ``origin`` of its proposal, and its outcome, or why it failed as ``reply``."""
-        return Event(kind, self.context, move.theta, move.goal, outcome, move.origin, reply=reply, place=self.number)
+        return Event(kind, self.context, move.theta, move.goal, outcome, move.origin, reply=reply, robot=self.number)

@@ -12,8 +12,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from sgimd_torch.memory.growing import Growing
 from sgimd_torch.memory.neighbours import Neighbours, Rows
-from sgimd_torch.memory.table import Table
 from sgimd_torch.spaces import Array, check_point
 
 __all__ = ["Memory", "Rows"]
@@ -41,10 +41,10 @@ class Memory:
                 f"got {context_dim}, {theta_dim} and {outcome_dim}"
             )
         self.context_dim, self.theta_dim, self.outcome_dim = context_dim, theta_dim, outcome_dim
-        self._contexts, self._thetas, self._outcomes = Table(context_dim), Table(theta_dim), Table(outcome_dim)
+        self._contexts, self._thetas, self._outcomes = Growing(context_dim), Growing(theta_dim), Growing(outcome_dim)
         # A key is a context followed by an outcome or by a theta; without contexts, outcomes and thetas are the keys.
-        self._by_outcome = Neighbours(Table(context_dim + outcome_dim) if context_dim else self._outcomes)
-        self._by_theta = Neighbours(Table(context_dim + theta_dim) if context_dim else self._thetas)
+        self._by_outcome = Neighbours(Growing(context_dim + outcome_dim) if context_dim else self._outcomes)
+        self._by_theta = Neighbours(Growing(context_dim + theta_dim) if context_dim else self._thetas)
         self._range = np.stack((np.full(theta_dim, np.inf), np.full(theta_dim, -np.inf)))
 
     def __len__(self) -> int:

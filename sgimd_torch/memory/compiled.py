@@ -1,23 +1,19 @@
 """Loads the modules whose functions numba compiles; without this, numba would be loaded with the package.
 
 kernels = compiled("sgimd_torch.inverses.kernels"); kernels.answer(...)
-Numba compiles once for each processor and version. It notices changes of a file, but not of the files that this file
-imports. So the cache folder has a checksum of all files in ``MODULES`` as its name. It lies beside this module, or in
-the cache folder of the user if the package cannot be written to, or where ``NUMBA_CACHE_DIR`` says. Two processes may
-compile at once. The folder lists checksums of its files, as damaged machine code could end the process: a file that is
-not as listed is removed, so it is made again.
+Numba keeps what it compiles for each processor and version. It notices changes of a file, but not of the files that
+this file imports. So its folder has a checksum of all files in ``MODULES`` as its name. The folder lies beside this
+module, or in the cache folder of the user if the package cannot be written to, or where ``NUMBA_CACHE_DIR`` says.
 """
 
 from __future__ import annotations
 
-import fcntl
 import importlib
-import os
+import shutil
 import subprocess
 import sys
 import tempfile
 import zlib
-from collections.abc import Iterator
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -25,8 +21,7 @@ from types import ModuleType
 from typing import Any, Final
 
 # All files with compiled functions; changes of a file that is missing here would not change the checksum.
-MODULES: Final = ("memory.jit", "memory.scan", "inverses.linear_kernel", "inverses.kernels")
-_LIST: Final = "checksums"
+MODULES: Final = ("memory.jit", "memory.scan", "inverses.tuples", "inverses.linear_kernel", "inverses.kernels")
 _PACKAGE: Final = Path(__file__).parents[1]
 
 
@@ -37,28 +32,29 @@ def compiled(name: str) -> ModuleType:
     from numba.core import event
 
     class Telling(event.Listener):
-        told = False
-
         def on_start(self, event: Any) -> None:
-            self.told = True
             _tell()
 
         def on_end(self, event: Any) -> None:
             pass
 
-    folder, config.CACHE_DIR = config.CACHE_DIR, _folder(config.CACHE_DIR)  # type: ignore[attr-defined]
+    chosen, folder = config.CACHE_DIR, _folder(config.CACHE_DIR)  # type: ignore[attr-defined]
+    config.CACHE_DIR = folder  # type: ignore[attr-defined]
     try:
-        with event.install_listener("numba:compile", telling := Telling()):
-            module = importlib.import_module(name)
-        if telling.told:
-            _list_files(Path(config.CACHE_DIR))  # type: ignore[attr-defined]
-        return module
+        with event.install_listener("numba:compile", Telling()):
+            try:
+                return importlib.import_module(name)
+            except ImportError:
+                raise
+            except Exception:  # what is kept may be damaged: pickle raises many kinds; any other error comes again
+                shutil.rmtree(folder, ignore_errors=True)
+                return importlib.import_module(name)
     finally:
-        config.CACHE_DIR = folder  # type: ignore[attr-defined]
+        config.CACHE_DIR = chosen  # type: ignore[attr-defined]
 
 
 def compile_all() -> None:
-    """Compile all functions that are not in the cache yet, half of them in a second process."""
+    """Compile all functions that are not kept yet, half of them in a second process."""
     *names, largest = (f"sgimd_torch.{name}" for name in MODULES)
     program = f"from {__name__} import compiled; compiled({largest!r})"
     with subprocess.Popen([sys.executable, "-c", program], stderr=subprocess.DEVNULL):
@@ -78,36 +74,8 @@ def _folder(chosen: str) -> str:
         with suppress(OSError):
             folder.mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryFile(dir=folder):
-                _remove_damaged(folder)
                 return str(folder)
     return _own_folder().name  # no folder can be written to, so it is compiled for this process alone
-
-
-def _remove_damaged(folder: Path) -> None:
-    """Remove all files that are not as they were listed."""
-    checksums = folder / _LIST
-    listed = checksums.read_text(encoding="utf-8", errors="replace").splitlines() if checksums.exists() else ()
-    for path, line in _files(folder):
-        if line not in listed:
-            path.unlink(missing_ok=True)
-
-
-def _list_files(folder: Path) -> None:
-    held = os.open(folder, os.O_RDONLY)
-    fcntl.flock(held, fcntl.LOCK_EX)  # else the list written last could be older than some of the files
-    try:
-        partial = folder / f"{os.getpid()}.part"
-        partial.write_text("\n".join(line for _, line in _files(folder)), encoding="utf-8")
-        partial.replace(folder / _LIST)
-    finally:
-        os.close(held)
-
-
-def _files(folder: Path) -> Iterator[tuple[Path, str]]:
-    """Each file of compiled functions, and its line in the list."""
-    for path in folder.rglob("*.nb?"):
-        with suppress(FileNotFoundError):  # another process removes it
-            yield path, f"{zlib.crc32(path.read_bytes()):08x} {path.relative_to(folder)}"
 
 
 @cache

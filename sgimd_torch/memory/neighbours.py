@@ -3,7 +3,7 @@
 The memory uses it to find outcomes near a goal (section 4.4.2 of Nguyen & Oudeyer, 2014: H of eq. 8) and movements
 like a given one (K_h). Faiss computes distances in single precision; those that may be among the least are computed
 anew in double precision. Of equally near rows the oldest comes first. Results depend on the rows alone.
-    neighbours = Neighbours(Table(2)); neighbours.keys.append(keys); rows = neighbours.nearest(queries, k=10)
+    neighbours = Neighbours(Growing(2)); neighbours.keys.append(keys); rows = neighbours.nearest(queries, k=10)
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sgimd_torch.memory.compiled import compiled
-from sgimd_torch.memory.table import Table
+from sgimd_torch.memory.growing import Growing
 from sgimd_torch.spaces import Array
 
 Rows = NDArray[np.int64]
@@ -40,7 +40,7 @@ class Neighbours:
     If there are more, rows lie in cells around some of the first rows; only the cells nearest to a query are searched.
     """
 
-    def __init__(self, keys: Table) -> None:
+    def __init__(self, keys: Growing) -> None:
         self.keys, self._lock = keys, RLock()
         self._width = next((width for width in _FAST_DIMS if width >= keys.dim), keys.dim)
         self._index: Any = faiss.IndexFlatL2(self._width)

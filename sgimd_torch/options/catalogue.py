@@ -1,9 +1,9 @@
-"""The catalogue: every name that the command line knows, with the place of its class, function or module.
+"""The catalogue: every name that the command line knows, with a reference to its class, function or module.
 
     load_word("goals", "interest-map")            # InterestMap, which is imported now
     load_word("goals", "mypackage.goals:Curious") # a class of your own
-To remove a feature, delete its folder and its lines of the table. The help text of a name is the first line of the
-docstring at its place. The options are keywords of the signature there (`sgimd_torch.options.signature`).
+Here are the names of the core; each room brings its own (`sgimd_torch.rooms`). A reference is ``module:attribute``. The
+help text of a name is the first line of the docstring there; the options are the keywords of the signature there.
 """
 
 from __future__ import annotations
@@ -12,38 +12,30 @@ import importlib
 import os
 import re
 import sys
-from collections.abc import Callable, Collection, Iterable
-from difflib import get_close_matches
+from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
-from sgimd_torch.options import function_of
+from sgimd_torch.calls import function_of
+from sgimd_torch.rooms import Usual, brought, room_of
+from sgimd_torch.texts import did_you_mean, unknown_name_error
 
 ROD: Final = "fishing-rod"
 _TABLE: Final = """
 algorithm    algorithms.paper           random=random_exploration sagg-riac observation imitation sgim-d
 algorithm    algorithms.paper           sagg-riac-letter sgim-d-letter
 algorithm    algorithms.practice        practice practice-taught
-algorithm    asking.algorithms          sgim-im sgim-im-search sgim-acts sgim-acts-search
-algorithm    rivals.quality_diversity   map-elites=map_elites_alone map-elites-taught=map_elites isoline=isoline_alone
-algorithm    rivals.quality_diversity   isoline-taught=isoline cma-me=cma_me_alone cma-me-taught=cma_me
-algorithm    rivals.quality_diversity   cma-mae=cma_mae_alone cma-mae-taught=cma_mae
-environment  runs.tasks.rod             fishing-rod
-environment  runs.tasks.robots          planar-arm-7 planar-arm-50
-environment  environments.mujoco_robot  mujoco=MujocoRobot
-environment  environments.lerobot       lerobot=LeRobotArm
+environment  tasks.rod                  fishing-rod
+environment  tasks.robots               planar-arm-7 planar-arm-50
 goals        goals.interest_map         interest-map=InterestMap
-goals        rivals.alp_gmm             alp-gmm=AlpGmm
 goals        goals.uniform              uniform=UniformGoals
 goals        goals.within_reach         within-reach=WithinReach
-goals        asking.interest            strategic=StrategicInterest
 progress     goals.regions              gained=gained_progress absolute=absolute_progress
 search       searches.simplex           nelder-mead=NelderMead
 search       searches.perturb           perturb=Perturb
 search       searches.vary              vary=Vary
-search       rivals.cma_es              cma-es=CmaEs
-search       forward_model.search       gradient=GradientSearch gradient-then-nelder-mead=GradientThenNelderMead
+search       forward_model.search       gradient=GradientSearch
 explore      searches.explore           anywhere=Anywhere returning=Returning
 inverse      inverses.locally_linear    linear=LocallyLinear
 inverse      inverses.local             paper=LocalInverse
@@ -55,63 +47,52 @@ inverse      forward_model.inverse      model-alone=ModelAlone
 network      forward_model.networks     perceptrons=Perceptrons
 judge        competence                 memory=Competence attempt=AttemptCompetence
 social       strategies                 imitate=Imitate emulate=Emulate
+watch        algorithms                 none=nobody
 teacher      teachers                   periodic=PeriodicTeacher initial=InitialTeacher at-once asked=AskedTeacher
-teacher      teach.by_hand              by-hand=ByHand
 choose       teachers                   least-explored random=at_random
-teachers     asking.teachers            all=AnsweringTeacher demonstrator-1 demonstrator-2 demonstrator-3
-teachers     asking.teachers            low-half=low_half_teacher high-half=high_half_teacher
-command      options.command_line       run
-command      runs.sweep                 sweep
-command      views.check                check
-command      views.demonstrations       demonstrations
-command      views.benchmark            benchmark
-command      views.table                table
-command      views.report.command       report
-command      views.report.paper         paper
-command      teach.command              teach
-command      views.film.command         film
-command      views.ask                  ask
-command      views.demo                 demo
+hook         board                      board=Board
+command      runs.command               run
 """
-WORDS: Final[dict[str, dict[str, str]]] = {line.split()[0]: {} for line in _TABLE.strip().splitlines()}
-"""Place of each name, by kind; in ``_TABLE`` a line has the kind, a module, and names of its members."""
-for _kind, _module, *_names in map(str.split, _TABLE.strip().splitlines()):
+WORDS: Final[dict[str, dict[str, str]]] = {}
+"""Reference of each name, by kind; in ``_TABLE`` a line has the kind, a module, and names of its members."""
+_lines = ((kind, module, names) for kind, module, *names in map(str.split, _TABLE.strip().splitlines()))
+for _kind, _module, _names in (*_lines, *brought("WORDS")):
     for _name, _, _member in (name.partition("=") for name in _names):
-        WORDS[_kind][_name] = _module if _kind == "command" else f"{_module}:{_member or _name.replace('-', '_')}"
-# Default teacher of each taught algorithm; "teachers": the algorithm asks teachers. Other algorithms learn alone.
-TAUGHT_BY: Final = {
-    **dict.fromkeys(("observation", "imitation", "sgim-d", "sgim-d-letter"), "periodic"),
-    **dict.fromkeys((word for word in WORDS["algorithm"] if word.endswith("-taught")), "periodic"),
-    "practice-taught": "at-once",
-    **dict.fromkeys((word for word, at in WORDS["algorithm"].items() if at.startswith("asking.")), "teachers"),
-}
+        _at = _module if _kind == "command" else f"{_module}:{_member or _name.replace('-', '_')}"
+        WORDS.setdefault(_kind, {})[_name] = _at
 _PACKAGE: Final = Path(__file__).parents[1]
-PLACES: Final = {f"{_PACKAGE.name}.{at}" for words in WORDS.values() for at in words.values()}
-"""Places of the catalogue. All other places are code of a user, even places in this library: from a module of ours,
-dots may lead to any module that it imports."""
+OURS: Final = {f"{_PACKAGE.name}.{at}" for words in WORDS.values() for at in words.values()}
+"""References of the catalogue. All others are code of a user, even in this library: from a module of ours, dots may
+lead to any module that it imports."""
 
 
-def place_of(kind: str, word: str) -> str:
-    """Place of the class, function or module that ``word`` names, as ``package.module:attribute``.
+def reference_of(kind: str, word: str) -> str:
+    """Reference of the class, function or module that ``word`` names, as ``package.module:attribute``.
 
     Raises:
-        ValueError: the name is neither in the catalogue nor a place.
+        ValueError: the name is neither in the catalogue nor a reference.
     """
     if word in WORDS[kind]:
         return f"{_PACKAGE.name}.{WORDS[kind][word]}"
-    if ":" not in word:
-        module, dot, name = word.rpartition(".")
-        meant = f"is it {module}:{name}?" if dot else "or, for code of your own, package.module:attribute"
-        if name in ("xml", "urdf"):
-            meant = f"for a model file write --environment mujoco --environment.model {word}: docs/how-to/mujoco.md"
-        raise unknown_name_error(kind, word, WORDS[kind], f"; {meant}")
-    return word
+    if ":" in word:
+        return word
+    module, dot, name = word.rpartition(".")
+    meant = f"is it {module}:{name}?" if dot else "or is it package.module:attribute, or of a room that is missing?"
+    meant = "for a model file see docs/how-to/mujoco.md" if name in ("xml", "urdf") else meant
+    raise unknown_name_error(kind, word, WORDS[kind], f"; {meant}")
 
 
 def word_of(kind: str, make: Callable[..., Any]) -> str:
-    """The name of a class or function, or its place if it has no name; the inverse of ``place_of``."""
-    place = f"{function_of(make).__module__}:{function_of(make).__qualname__}"
-    return next((word for word, at in WORDS[kind].items() if f"{_PACKAGE.name}.{at}" == place), place)
+    """The name of a class or function, or its reference if it has no name; the inverse of ``reference_of``."""
+    if isinstance(make, Usual):
+        return make.word
+    reference = f"{function_of(make).__module__}:{function_of(make).__qualname__}"
+    return next((word for word, at in WORDS[kind].items() if f"{_PACKAGE.name}.{at}" == reference), reference)
+
+
+def rooms_of(words: Iterable[tuple[str, str]]) -> list[str]:
+    """Names of the rooms that bring these words, given with their kinds."""
+    return sorted({room for kind, word in words if (room := room_of(WORDS.get(kind, {}).get(word, "")))})
 
 
 def load_word(kind: str, word: str) -> Callable[..., Any]:
@@ -120,16 +101,16 @@ def load_word(kind: str, word: str) -> Callable[..., Any]:
     Raises:
         ValueError: there is none, its module cannot be imported, or it cannot be called; the message says why.
     """
-    return load_place(f"{kind} {word}", place_of(kind, word), ours=word in WORDS[kind])
+    return load_reference(f"{kind} {word}", reference_of(kind, word), ours=word in WORDS[kind])
 
 
-def load_place(what: str, place: str, *, ours: bool = False) -> Callable[..., Any]:
+def load_reference(what: str, reference: str, *, ours: bool = False) -> Callable[..., Any]:
     """The class or function at a ``package.module:attribute``; ``what`` begins the message of an error.
 
     Raises:
-        ValueError: see ``load_word``; if the place is ``ours``, the message of an ImportError is used as it is.
+        ValueError: see ``load_word``; if the reference is ``ours``, the message of an ImportError is used as it is.
     """
-    module, _, name = place.partition(":")
+    module, _, name = reference.partition(":")
     folder = os.getcwd()
     if module.endswith(".py"):
         raise ValueError(f"{what}: write the module without .py and with dots, {module[:-3].replace('/', '.')}:{name}")
@@ -160,16 +141,3 @@ def about(kind: str, word: str) -> str:
     begin = rf"^(?:(?:class|def) {name}\b|{name} = )" if name else r"\A"
     described = re.search(begin + r'.*?"""(.*?)\.?(?:"""|\n)', source, re.DOTALL | re.MULTILINE)
     return described[1] if described else ""
-
-
-def unknown_name_error(what: str, word: str, known: Collection[str], also: str = "") -> ValueError:
-    """The error for an unknown ``word``; the message has the nearest ``known`` name, all known names, and ``also``."""
-    near = did_you_mean(word, known)
-    return ValueError(f"unknown {what} {word!r}{f'{near} Known' if near else '; known'} are {', '.join(known)}{also}")
-
-
-def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:
-    """A question such as ``; did you mean vary?`` with at most ``most`` similar names; empty if no name is similar."""
-    spellings = {word.lower().replace("_", "-"): word for word in known}
-    near = get_close_matches(name.lower().replace("_", "-"), spellings, most, 0.5)
-    return f"; did you mean {' or '.join(spellings[word] for word in near)}?" if near else ""

@@ -3,28 +3,28 @@
 Defaults are those of the library, so a run with one changed option is an ablation.
     config = Config(algorithm="sagg-riac", parts={"goals.window": 12}); config["search.noise"]
 Options of a part are the keywords of its signature (`sgimd_torch.options.signature`). A keyword that is called like a
-kind of the catalogue, such as ``goals``, chooses another part.
+kind of the catalogue, such as ``goals``, chooses another part. Options of hooks, such as ``until``, have no prefix.
 """
 
 from __future__ import annotations
 
-import importlib.util
 import json
-import math
 import os
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, Final, NamedTuple, Self, get_args
+from typing import Any, Final, NamedTuple, Self
 
-from sgimd_torch.options.catalogue import ROD, TAUGHT_BY, WORDS, did_you_mean, load_word, word_of
-from sgimd_torch.options.signature import Option, as_text, options_of, parameters_of, parsed
+from sgimd_torch.calls import NO_DEFAULT, parameters_of
+from sgimd_torch.options.catalogue import ROD, WORDS, load_word, word_of
+from sgimd_torch.options.signature import Option, options_of
+from sgimd_torch.texts import as_text, did_you_mean
 
 OWN: Final = "own"  # name of the run's own inverse model
-FILES: Final = ("benchmark", "demonstrations", "begin_with")  # options that name a file
-OF_TEACHING: Final = ("demonstrations", "teacher", "teachers", "social")  # options of taught algorithms
-LEAST: Final = {"seed": 0, "movements": 1, "repeats": 0, "failures": 1, "at_once": 1, "evaluate_at": 1, "floor_at": 1}
+OF_TEACHING: Final = ("demonstrations", "teacher", "social")  # options of taught algorithms
+USUAL_TEACHER: Final = {"practice-taught": "at-once"}  # by algorithm; of all others: "periodic"
+LEAST: Final = {"seed": 0, "movements": 1, "repeats": 0, "failures": 1, "evaluate_at": 1, "floor_at": 1}
 """Least value of an option, or of each of its numbers."""
 MOST_MOVEMENTS: Final = 10**8
 
@@ -34,15 +34,11 @@ class Config:
     """One run.
 
     Args:
-        algorithm: learner, see below; the default needs no teacher, as an unknown robot has none.
+        algorithm: learner; the default needs no teacher, as an unknown robot has none.
         seed: random seed; two runs with equal options and an equal seed are equal.
         movements: number of movements, rests included.
-        until: mean error (unit of T) that ends the run once it is expected; null: none.
-        teachers: names of teachers to ask; null: one with all demonstrations.
         out: folder for runs; a run with seed 3 goes to OUT/NAME/seed-003.
         name: name of the variant, NAME in the path of the run; null: the algorithm.
-        board: true to write curves and pictures for TensorBoard into the run's folder.
-        checkpoints: true to keep a checkpoint of the forward model at each evaluation.
         evaluate_at: numbers of movements after which to evaluate, besides the end; null: 250, 500 and every 1000; []:
             never, not even at the end.
         evaluated_by: inverse models to evaluate: first own, which is the run's, then names for --inverse.
@@ -50,11 +46,9 @@ class Config:
         floor_at: evaluations that measure noise; null: the last; []: none.
         benchmark: file of goals for evaluations; null: the environment's own.
         demonstrations: file of recorded demonstrations; null: the environment's own.
-        begin_with: run.sqlite or csv of another robot or simulator to begin with; null: none.
         failures: number of failed movements in a row that stops the run; null: 10.
-        at_once: number of robots that move at once; at first one, then one for each 30 movements before.
-        context: previous: theta of the movement before, for robots with memory; null: no theta.
-        parts: parts and their options by name, such as "goals" or "goals.window"; defaults may be left out.
+        parts: parts and options of parts and hooks by name, such as "goals", "goals.window" or "until"; defaults may be
+            left out.
 
     Raises:
         ValueError: a value is out of its range, or a name is unknown.
@@ -63,22 +57,15 @@ class Config:
     algorithm: str = "practice"
     seed: int = 0
     movements: int = 5000
-    until: float | None = None
-    teachers: tuple[str, ...] | None = None
     out: Path = Path("runs")
     name: str | None = None
-    board: bool = False
-    checkpoints: bool = False
     evaluate_at: tuple[int, ...] | None = None
     evaluated_by: tuple[str, ...] = (OWN,)
     repeats: int = 2
     floor_at: tuple[int, ...] | None = None
     benchmark: Path | None = None
     demonstrations: Path | None = None
-    begin_with: Path | None = None
     failures: int | None = None
-    at_once: int = 1
-    context: str | None = None
     parts: Mapping[str, Any] | tuple[tuple[str, Any], ...] = ()
 
     def __post_init__(self) -> None:
@@ -88,34 +75,19 @@ class Config:
                 raise self._unknown(name)
         changed = sorted((name, value) for name, value in given.items() if differ(value, self.defaults[name]))
         object.__setattr__(self, "parts", tuple(changed))
-        if self.teachers is not None and self.teaching != "teachers":
-            raise self._unknown("teachers")
         if self.demonstrations is not None and not self.teaching:
             raise self._unknown("demonstrations")
-        if self.begin_with is not None and "prior" not in parameters_of(self.chosen["algorithm"].make):
-            raise ValueError(f"--begin-with: algorithm {self.algorithm} does not learn from another robot")
         for name, least in LEAST.items():
             value = getattr(self, name)
             if value is not None and min(value if isinstance(value, tuple) else (value,), default=least) < least:
                 raise ValueError(f"{name} must be at least {least}, got {as_text(value)}")
         if self.movements > MOST_MOVEMENTS:
             raise ValueError(f"movements must be at most {MOST_MOVEMENTS}, got {self.movements}")
-        if self.context not in (None, "previous"):
-            raise ValueError(f"context must be previous or null, got {self.context}; is it an option of sgimd ask?")
-        if self.context and self.teaching:
-            raise ValueError("context previous: the movement before a demonstration is not known; use no teacher")
-        if self.until is not None and not 0 < self.until < math.inf:
-            raise ValueError(f"until must be an error above 0, in the unit of T, got {self.until}")
         if self.repeats == 1:
             raise ValueError("repeats must be 0 or at least 2, got 1; one outcome shows no scatter")
-        for name in ("evaluated_by", "teachers"):
-            words = getattr(self, name)
-            if words is not None and (not words or len({*words}) < len(words)):
-                raise ValueError(f"{name} must have at least one name, and each only once, got {as_text(words)}")
+        check_names("evaluated_by", self.evaluated_by)
         if self.evaluated_by[0] != OWN:
             raise ValueError(f"evaluated_by must begin with {OWN}, got {as_text(self.evaluated_by)}")
-        if self.board and importlib.util.find_spec("tensorboardX") is None:
-            raise ValueError("board true needs tensorboardX, which is not installed; pip install 'sgimd-torch[board]'")
         if self.variant in ("", ".", "..") or any(sign in self.variant for sign in "/\\\0"):
             raise ValueError(f"name must be the name of one directory, got {self.variant!r}; is it a path for --out?")
 
@@ -128,9 +100,9 @@ class Config:
         return self.values[name]
 
     @cached_property
-    def chosen(self) -> dict[str, Part]:
+    def chosen(self) -> dict[str, Chosen]:
         """Parts of the run, by name; the run itself is the part ""."""
-        return chosen({"algorithm": self.algorithm, "teachers": self.teachers, **dict(self.parts)})
+        return chosen({"algorithm": self.algorithm, **dict(self.parts)})
 
     @cached_property
     def defaults(self) -> dict[str, Any]:
@@ -145,12 +117,7 @@ class Config:
     @property
     def teaching(self) -> str:
         """How the learner is taught: by "teachers" (it asks them), by a "teacher" (who is not asked), or "" (alone)."""
-        return teaching(self.values)
-
-    @property
-    def asked(self) -> tuple[str, ...]:
-        """Names of the teachers whom the learner asks."""
-        return (self.teachers or ("all",)) if self.teaching == "teachers" else ()
+        return teaching(self.chosen["algorithm"].make, self.values)
 
     def constructor(self, name: str) -> Callable[..., Any]:
         """The constructor of a part, with its options and the constructors of the parts that it chooses."""
@@ -184,16 +151,16 @@ class Config:
         """
         values, options = dict(settings), all_options(chosen({"algorithm": cls.algorithm, **settings}))
         for name, value in settings.items():
-            kind = options[name].kind if name in options else None
+            wanted = options[name].values if name in options else None
             if isinstance(value, list):
                 values[name] = tuple(value)
-            elif isinstance(value, str) and not isinstance(kind, str | None):
+            elif isinstance(value, str) and wanted is not None:
                 try:
-                    values[name] = parsed(value, kind)
-                    if Path in (kind, *get_args(kind)) and value and os.path.exists(folder / value):
-                        values[name] = type(values[name])(folder / value)
+                    values[name] = wanted.of(value)
                 except ValueError as error:
                     raise ValueError(f"--{dashed(name)} {error}") from error
+                if wanted.are_paths and value and os.path.exists(folder / value):
+                    values[name] = type(values[name])(folder / value)
         parts = {name: value for name, value in values.items() if name not in RUN}
         return cls(**{name: value for name, value in values.items() if name in RUN}, parts=parts)
 
@@ -227,20 +194,12 @@ class Config:
         wanted = usual if self.evaluate_at is None else self.evaluate_at
         return sorted({movements for movements in wanted if movements < self.movements} | {self.movements})
 
-    def due(self, movements: int, numbers: Iterable[int]) -> bool:
-        """Whether one of ``numbers`` falls into the group of robots that ended after this number of ``movements``."""
-        return any(0 <= movements - number < self.at_once for number in numbers)
-
-    def first_missing(self, made: Collection[int], requested: Iterable[int]) -> float:
-        """The first of the ``requested`` moments at which no evaluation was ``made``; infinite if there is none."""
-        return next((number for number in requested if not any(self.due(n, [number]) for n in made)), math.inf)
-
     def _unknown(self, name: str) -> ValueError:
         """The error for an option that this run does not have."""
         owner = name.rpartition(".")[0]
         part = self.chosen[owner] if owner and owner in self.chosen else self.chosen["algorithm"]
         if name.partition(".")[0] in OF_TEACHING and not self.teaching:
-            why = f"learns alone; taught are {', '.join(TAUGHT_BY)}"
+            why = "learns alone; --algorithm sgim-d, for example, is taught"
         else:
             known = sorted(self.defaults.keys() - {name})
             near = did_you_mean(name, [option for option in known if option.rpartition(".")[0] == owner], 2)
@@ -249,15 +208,15 @@ class Config:
 
 
 RUN: Final = options_of(Config)
-"""Options of every run."""
+"""Options of every run, without those of hooks."""
 
 
-class Part(NamedTuple):
-    """A part of a run.
+class Chosen(NamedTuple):
+    """A part that a run has chosen.
 
     Attributes:
         kind: kind of the part, such as "progress".
-        word: name of the part in the catalogue, or place of the part.
+        word: name of the part in the catalogue, or its reference.
         make: constructor.
         options: options by their names in the run, such as "goals.progress.window"; the default of a part is its name.
     """
@@ -268,16 +227,18 @@ class Part(NamedTuple):
     options: Mapping[str, Option]
 
 
-def teaching(given: Mapping[str, Any]) -> str:
-    """How a learner is taught: as the catalogue says, or, for a user's own learner, by whoever was given."""
-    if ":" in given["algorithm"]:
-        return "teachers" if given.get("teachers") else "teacher" if "teacher" in given else ""
-    by = TAUGHT_BY.get(given["algorithm"], "")
-    return by if by in ("", "teachers") else "teacher"
+def teaching(algorithm: Callable[..., Any], given: Mapping[str, Any]) -> str:
+    """How a learner is taught: by what its function must be given, or by a teacher where it may have one."""
+    fixed = algorithm.keywords if isinstance(algorithm, partial) else {}
+    parameters = {name: parameter for name, parameter in parameters_of(algorithm).items() if name not in fixed}
+    needed = {name for name, parameter in parameters.items() if parameter.default is NO_DEFAULT}
+    if "teachers" in needed:
+        return "teachers"
+    return "teacher" if "correspondence" in needed or ("correspondence" in parameters and "teacher" in given) else ""
 
 
-def chosen(given: Mapping[str, Any]) -> dict[str, Part]:
-    """Parts of a run by name: the run itself, algorithm, environment, teacher, and the parts that these choose.
+def chosen(given: Mapping[str, Any]) -> dict[str, Chosen]:
+    """Parts of a run by name: the run itself, hooks, algorithm, environment, teacher, and what these choose.
 
     Args:
         given: choices by name, such as "algorithm" or "goals"; other names are ignored.
@@ -285,12 +246,16 @@ def chosen(given: Mapping[str, Any]) -> dict[str, Part]:
     Raises:
         ValueError: there is no such part, or a package that it needs is not installed.
     """
-    first = {"algorithm": Option("algorithm", Config.algorithm), "environment": Option("environment", ROD)}
-    if teaching(given) == "teacher":
-        first["teacher"] = Option("teacher", TAUGHT_BY.get(given["algorithm"], "periodic"))
-    parts, waiting = {"": Part("run", "run", Config, {**RUN, **first})}, list(first.items())
+    first = {"algorithm": Option(Config.algorithm, part="algorithm"), "environment": Option(ROD, part="environment")}
+    algorithm = given.get("algorithm", Config.algorithm)
+    if teaching(load_word("algorithm", algorithm), given) == "teacher":
+        first["teacher"] = Option(USUAL_TEACHER.get(algorithm, "periodic"), part="teacher")
+    parts, waiting = {"": Chosen("run", "run", Config, {**RUN, **first})}, list(first.items())
+    for word in WORDS["hook"]:
+        hook = load_word("hook", word)
+        parts[f"hook {word}"] = Chosen("hook", word, hook, options_of(hook))
     while waiting:
-        name, (kind, default) = waiting.pop(0)
+        name, (default, _, kind) = waiting.pop(0)
         usual = default if isinstance(default, str) else word_of(kind, default)
         word = given.get(name, usual)
         make = default if callable(default) and word == usual else load_word(kind, word)
@@ -302,15 +267,15 @@ def chosen(given: Mapping[str, Any]) -> dict[str, Part]:
             if keyword in fixed or own in RUN:  # an option of the run hides an option of the algorithm
                 continue
             options[own] = option
-            if option.kind in WORDS:
-                options[own] = Option(option.kind, word_of(option.kind, option.default))
+            if option.part:
+                options[own] = Option(word_of(option.part, option.default), part=option.part)
                 choices.append((own, option))
-        parts[name] = Part(kind, word, make, options)
+        parts[name] = Chosen(kind, word, make, options)
         waiting[:0] = choices
     return parts
 
 
-def all_options(parts: Mapping[str, Part]) -> dict[str, Option]:
+def all_options(parts: Mapping[str, Chosen]) -> dict[str, Option]:
     """Options of a run with these parts, by name."""
     return {name: option for part in parts.values() for name, option in part.options.items()}
 
@@ -319,6 +284,16 @@ def words(config: Config) -> list[str]:
     """Arguments of ``sgimd run`` for a run: ``--dashed-name=value`` for the algorithm and each changed option."""
     changed = {name: value for name, value in config.values.items() if differ(value, config.defaults[name])}
     return [f"--{dashed(name)}={as_text(value)}" for name, value in ({"algorithm": config.algorithm} | changed).items()]
+
+
+def check_names(option: str, names: tuple[str, ...]) -> None:
+    """Refuse an option without names, or with a name twice.
+
+    Raises:
+        ValueError: it is such an option.
+    """
+    if not names or len({*names}) < len(names):
+        raise ValueError(f"{option} must have at least one name, and each only once, got {as_text(names)}")
 
 
 def differ(one: Any, other: Any) -> bool:

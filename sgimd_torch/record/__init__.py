@@ -23,6 +23,8 @@ from contextlib import AbstractContextManager, closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any, Final, Self
 
+import numpy as np
+
 from sgimd_torch import __version__
 from sgimd_torch.learner.events import Event
 from sgimd_torch.record.layout import (
@@ -150,6 +152,9 @@ class Record(AbstractContextManager["Record"]):
     def add(self, event: Event) -> None:
         """Append an event; it is on the disk after ``commit``."""
         lesson = None if event.lesson is None else self._number_of(event.lesson)
+        if event.kept is not None:
+            number = self._n_rows["events"] + 1
+            self._append("kept", [(number, *row) for row in np.concatenate(event.kept, axis=1).tolist()])
         self._append("events", [event_row(event, self.movements, lesson, self.dims)])
         self.movements = movements_after(self.movements, event.kind)
 
@@ -284,10 +289,10 @@ def _connect(path: Path, write: bool) -> sqlite3.Connection:
     try:
         # Readers need mode=rw, too, to clean up after a killed writer. SQLite still opens a read-only file for reading.
         # check_same_thread=False: teaching by hand opens the record in one thread and later uses it in another.
-        place, patience = f"{path.resolve().as_uri()}?mode=rw", 0.5 if write else 10.0
+        address, patience = f"{path.resolve().as_uri()}?mode=rw", 0.5 if write else 10.0
         if not (write or os.access(path.parent, os.W_OK) or path.with_name(f"{path.name}-wal").exists()):
-            place += "&immutable=1"  # else SQLite would make a log for the record of a run that was killed
-        return sqlite3.connect(place, uri=True, isolation_level=None, timeout=patience, check_same_thread=False)
+            address += "&immutable=1"  # else SQLite would make a log for the record of a run that was killed
+        return sqlite3.connect(address, uri=True, isolation_level=None, timeout=patience, check_same_thread=False)
     except (sqlite3.Error, OSError) as error:
         raise RunError(f"{path} cannot be opened: {error}") from error
 
@@ -298,7 +303,7 @@ def _shares_memory(path: Path) -> bool:
         mounts = [line.split()[1:3] for line in Path("/proc/mounts").read_text(encoding="utf-8").splitlines()]
     except OSError:  # only Linux has this list
         return True
-    kinds = {place: kind for place, kind in mounts if path.resolve().is_relative_to(place)}
+    kinds = {folder: kind for folder, kind in mounts if path.resolve().is_relative_to(folder)}
     return kinds.get(max(kinds, key=len, default="")) in _LOCAL
 
 

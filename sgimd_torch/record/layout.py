@@ -38,7 +38,7 @@ def layout(dims: Dims) -> dict[str, list[str]]:
     context, theta, goal, outcome = (
         _vector(name, dim) for name, dim in (("context", c), ("theta", p), ("goal", t), ("outcome", t))
     )
-    words = ["demonstration INTEGER", "who TEXT", "strategy TEXT", "reply TEXT", "place INTEGER"]
+    words = ["demonstration INTEGER", "who TEXT", "strategy TEXT", "reply TEXT", "robot INTEGER", "since INTEGER"]
     evaluated = ["movements INTEGER", "inverse TEXT"]
     numbers = ["mean_error", "median_error", "p90_error", "noise_floor", "expected_error"]
     predicted = [column for name in ("predicted", "epistemic", "aleatoric") for column in _vector(name, t)]
@@ -50,6 +50,7 @@ def layout(dims: Dims) -> dict[str, list[str]]:
         "about": ["name TEXT", "value TEXT"],
         "events": ["movement INTEGER", "kind TEXT", "origin TEXT", *context, *theta, *goal, *outcome, *words],
         "prior": [*context, *theta, *outcome],
+        "kept": ["event INTEGER", *context, *theta, *outcome],
         "demonstrations": [*context, *outcome, "n_joints INTEGER", "times BLOB", "trajectory BLOB"],
         "goals": ["goal INTEGER", *goal],
         "evaluations": [*evaluated, *(f"{name} REAL" for name in numbers), "goals_met INTEGER"],
@@ -71,7 +72,7 @@ def event_row(event: Event, movement: int, lesson: int | None, dims: Dims) -> Ro
         *_cells(event.outcome, t),
     )
     origin, who, strategy, reply = map(_text, (event.origin, event.who, event.strategy, event.reply))
-    return movement, str(event.kind), origin, *vectors, lesson, who, strategy, reply, event.place
+    return movement, str(event.kind), origin, *vectors, lesson, who, strategy, reply, event.robot, event.since
 
 
 def event_reader(dims: Dims, demonstrations: Sequence[Demonstration]) -> Callable[[Row], Event]:
@@ -81,12 +82,12 @@ def event_reader(dims: Dims, demonstrations: Sequence[Demonstration]) -> Callabl
 
     def read(row: Row) -> Event:
         context, theta, goal, outcome = (_array(row[part]) for part in parts)
-        lesson, who, strategy, reply, place = row[-5:]
+        lesson, who, strategy, reply, robot, since = row[-6:]
         kind = Kind(row[1])
         if kind not in _IN_CONTEXT:
             context = None
         demonstration = None if lesson is None else demonstrations[lesson]
-        return Event(kind, context, theta, goal, outcome, row[2], demonstration, who, strategy, reply, place)
+        return Event(kind, context, theta, goal, outcome, row[2], demonstration, who, strategy, reply, robot, since)
 
     return read
 

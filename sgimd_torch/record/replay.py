@@ -29,7 +29,13 @@ _TRAINED_ELSEWHERE: Final = (
     "movement {} was recorded with another theta: another device or processor trained the forward model. The learner "
     "remembers the recorded thetas"
 )
-_ALONE: Final = (Kind.SHOWN, Kind.ASKED, Kind.ADDED, Kind.CHANGED)  # events that are never grouped with others
+_ALONE: Final = (
+    Kind.SHOWN,
+    Kind.ASKED,
+    Kind.ADDED,
+    Kind.RESTARTED,
+    Kind.CHANGED,
+)  # events that are never grouped with others
 _ROUNDED: Final = (
     "movement {} was recorded with a theta that differs by rounding: another version or processor made the record. The "
     "learner remembers the recorded theta"
@@ -121,7 +127,7 @@ def replay(
         Episodes, as `run` has yielded them.
 
     Returns:
-        Demonstration, request and reply since the last episode of each robot, by the place of the robot.
+        Demonstration, request and reply since the last episode of each robot, by number of the robot.
 
     Raises (when iterated):
         ReplayError: the learner proposes a movement, or the teacher a demonstration, that differs from the record. A
@@ -133,9 +139,9 @@ def replay(
     before: dict[int, BeforeMovement] = {}
     for group in _together(events):
         event, index = group[0], learner.movements
-        last, preceding = index + group[-1].place, before.get(event.place, BeforeMovement())
+        last, preceding = index + group[-1].robot, before.get(event.robot, BeforeMovement())
         # Between two runs the caller may show something, or begin or end an attempt; then no teacher is asked.
-        between = event.place < 0 or (event.kind in _ALONE and event.who is None)
+        between = event.robot < 0 or (event.kind in _ALONE and event.who is None)
         if teacher is not None and not between:
             offered |= {k: teacher.offer(k, learner.memory) for k in range(max(asked_until, index), last + 1)}
             asked_until = max(asked_until, last + 1)
@@ -145,27 +151,27 @@ def replay(
                     _check_lesson(last, event.lesson, offered.pop(last, None))
                 assert event.lesson is not None
                 try:
-                    learner.watch(event.lesson, who=event.who, place=event.place)
+                    learner.watch(event.lesson, who=event.who, robot=event.robot)
                 except RuntimeError as error:
                     refused = f"before movement {last} the learner was shown a demonstration, now it takes none"
                     raise ReplayError(f"{refused}; is it built in the same way and with the same seed?") from error
                 if not between:
                     offered.pop(last, None)
-                    before[event.place] = preceding._replace(demonstration=event.lesson)
+                    before[event.robot] = preceding._replace(demonstration=event.lesson)
             case Kind.ASKED:
                 assert event.context is not None
-                learner.request(event.context, place=event.place)
+                learner.request(event.context, robot=event.robot)
                 if event.who is not None and event.goal is not None:
                     request = Request(event.who, event.goal, event.strategy or "")
-                    before[event.place] = preceding._replace(request=request, reply=event.reply or "")
+                    before[event.robot] = preceding._replace(request=request, reply=event.reply or "")
                     if event.reply != "shown":
-                        learner.go_on_alone(event.reply or "", place=event.place)
+                        learner.go_on_alone(event.reply or "", robot=event.robot)
             case Kind.ADDED:
                 assert event.context is not None
                 assert event.theta is not None
                 assert event.outcome is not None
                 learner.add(event.context, event.theta, event.outcome)
-            case Kind.CHANGED:  # the learner has noticed it again
+            case Kind.RESTARTED | Kind.CHANGED:  # the learner has noticed it again
                 pass
             case Kind.INTERRUPTED if between:
                 learner.interrupt()
@@ -173,17 +179,17 @@ def replay(
             case _:
                 for number in range(index, last + 1):
                     _check_lesson(number, None, offered.pop(number, None))
-                contexts: list[Array | Failure] = [Failure("")] * (group[-1].place + 1)
+                contexts: list[Array | Failure] = [Failure("")] * (group[-1].robot + 1)
                 for event in group:
                     if event.context is not None and not _unseen(event):
-                        contexts[event.place] = event.context
+                        contexts[event.robot] = event.context
                 moves = learner.ask_many(contexts)
                 for event in group:
-                    if _check_move(learner, event, index + event.place, moves[event.place], exact):
+                    if _check_move(learner, event, index + event.robot, moves[event.robot], exact):
                         assert event.theta is not None
-                        learner.replace_theta(event.theta, place=event.place)
+                        learner.replace_theta(event.theta, robot=event.robot)
                         if not rounded:
-                            remark = (_ROUNDED if exact else _TRAINED_ELSEWHERE).format(index + event.place)
+                            remark = (_ROUNDED if exact else _TRAINED_ELSEWHERE).format(index + event.robot)
                             warnings.warn(remark, RuntimeWarning, stacklevel=2)
                         rounded = True
                 if event.kind == Kind.INTERRUPTED:
@@ -195,8 +201,8 @@ def replay(
                     context, failed = event.context, event.reply or "" if _failed(event) else ""
                     if context is None or _unseen(event):
                         context = np.full(learner.memory.context_dim, np.nan)
-                    preceding = before.pop(event.place, BeforeMovement())
-                    yield Episode(index + event.place, context, moves[event.place], event.outcome, *preceding, failed)
+                    preceding = before.pop(event.robot, BeforeMovement())
+                    yield Episode(index + event.robot, context, moves[event.robot], event.outcome, *preceding, failed)
     return before
 
 
@@ -211,12 +217,12 @@ def repeats_exactly(about: Mapping[str, Any], learner: Learner) -> bool:
 
 
 def _together(events: Iterable[Event]) -> Iterator[list[Event]]:
-    """Groups of events: movements that were made at once, by place of the robot; every other event is alone."""
+    """Groups of events: movements that were made at once, by number of the robot; every other event is alone."""
     group: list[Event] = []
     for event in events:
-        moved = event.kind not in _ALONE and event.place >= 0
+        moved = event.kind not in _ALONE and event.robot >= 0
         same = group and (event.kind == Kind.INTERRUPTED) == (group[-1].kind == Kind.INTERRUPTED)
-        if group and not (moved and same and event.place > group[-1].place):
+        if group and not (moved and same and event.robot > group[-1].robot):
             yield group
             group = []
         if moved:

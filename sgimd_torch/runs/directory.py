@@ -7,44 +7,62 @@ A run is the file ``run.sqlite`` in OUT/NAME/seed-003; ``docs/runs.md`` explains
 from __future__ import annotations
 
 import importlib.metadata
+import importlib.util
+import math
 import os
 import platform
 import subprocess
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
 import sgimd_torch
+from sgimd_torch.calls import function_of
 from sgimd_torch.environments.protocol import Environment, FromFiles
 from sgimd_torch.files import checksum, make_folder
-from sgimd_torch.options import function_of
-from sgimd_torch.options.build import RunParts, build
-from sgimd_torch.options.catalogue import PLACES, WORDS
-from sgimd_torch.options.config import FILES, Config, differ, words
+from sgimd_torch.options.catalogue import OURS, WORDS, load_word, rooms_of
+from sgimd_torch.options.config import Config, differ, words
 from sgimd_torch.record import Dims, Record, RunError
-from sgimd_torch.runs.signals import say
+from sgimd_torch.rooms import rooms
+from sgimd_torch.runs.build import build
+from sgimd_torch.runs.messages import say
+from sgimd_torch.runs.run_parts import RunParts
 
 RUN_FILE: Final = "run.sqlite"
-CODE: Final = (*WORDS, "evaluated_by", "robot", "seen_by")  # last words of options that may name a place of code
+CODE: Final = (*WORDS, "evaluated_by", *(name for room in rooms().values() for name in getattr(room, "CODE", ())))
+"""Last words of options that may name code of a user, as ``package.module:attribute``."""
 THREADS: Final = "environment.threads"
 DEVICE: Final = "inverse.accelerator"
-# Settings in which runs may differ: they name, show or speed up a run.
-NOT_COMPARED: Final = ("seed", "out", "name", "board", "checkpoints", THREADS, DEVICE)
 EVALUATES: Final = ("evaluated_by", "repeats", "floor_at", "benchmark_crc32")  # equal options of all evaluations
-MAY_CHANGE: Final = (
-    *("movements", "until", "out", "name", "board", "checkpoints", "failures", "evaluate_at"),
-    *(*FILES, *EVALUATES, THREADS, DEVICE),
-)
-"""Options that may change when a run is resumed, as they do not affect the learner. Files are compared by their
-checksums: the demonstrations must be equal, the benchmark may be another one."""
 LONGEST: Final = 504  # bytes, longest path of a file that SQLite opens
 LIBRARIES: Final = ("numpy", "scipy", "faiss-cpu", "mujoco")
 FORWARD: Final = ("torch", "lightning")  # libraries of a forward model
 EVALUATED: Final = ("evaluations", "errors", "regions")  # tables that each evaluation adds to
 OF_MODEL: Final = ("predictions", "refreshes")  # tables that a forward model adds to; it also clears them
+
+
+@cache
+def not_compared() -> frozenset[str]:
+    """Settings in which runs may differ: they name, show or speed up a run."""
+    return frozenset({"seed", "out", "name", THREADS, DEVICE}).union(
+        *(hook.may_change for hook in _hooks() if not hook.compared)
+    )
+
+
+@cache
+def may_change() -> frozenset[str]:
+    """Options that may change when a run is resumed, as they do not affect the learner. Files are compared by their
+    checksums: the demonstrations must be equal, the benchmark may be another one."""
+    own = {"movements", "out", "name", "failures", "evaluate_at", *EVALUATES, THREADS, DEVICE}
+    return frozenset(own.union(*(hook.may_change for hook in _hooks())))
+
+
+def _hooks() -> list[Any]:
+    return [load_word("hook", word) for word in WORDS["hook"]]
 
 
 def open_run(parts: RunParts, *, resume: bool) -> tuple[Record, list[str]]:
@@ -70,6 +88,8 @@ def open_run(parts: RunParts, *, resume: bool) -> tuple[Record, list[str]]:
         "robot": type(robot).__name__,
         "words": words(config),
         "tolerance": parts.learner.problem.tolerance,
+        "robots": parts.robots,
+        "rooms": rooms_of((part.kind, part.word) for part in config.chosen.values() if part.kind != "hook"),
         "ended_early": None,
         "spaces": {n: [b.low.tolist(), b.high.tolist(), b.names, b.unit] for n, b in spaces.items()},
     }
@@ -105,7 +125,7 @@ def with_found_earlier(config: Config) -> Config:
     with Record(path) as record:
         before = record.about.get("settings", {})
         others = changed_settings(before, config.settings, record.about.get("folder", ""))
-    if any(name.startswith("environment") for name in {*others} & config.settings.keys() - names - {*NOT_COMPARED}):
+    if any(name.startswith("environment") for name in {*others} & config.settings.keys() - names - not_compared()):
         return config  # it is another robot's run
     earlier = {name: before[name] for name in names & before.keys() if name not in dict(config.parts)}
     return Config.from_settings({**config.settings, **earlier})
@@ -158,11 +178,12 @@ def _reopened(path: Path, about: dict[str, Any], dims: Dims, parts: RunParts, no
         others = _refuse_other(record, about, dims)
         if record.movements > config.movements:
             raise RunError(f"{path} has {record.movements} movements already, {config.movements} were requested")
-        if "until" not in others:
-            about["ended_early"] = record.about["ended_early"]
+        if others & {name for part in config.chosen.values() if part.kind == "hook" for name in part.options}:
+            record.about["ended_early"] = None
+        about["ended_early"] = record.about["ended_early"]
         earlier_goals, goals = np.array([goal for _, *goal in record.rows("goals")]), parts.benchmark.goals
         anew = bool(others & {*EVALUATES}) or len(earlier_goals) != len(goals) or not np.allclose(earlier_goals, goals)
-        _forget_evaluations(record, config, about["ended_early"], anew=anew, notes=notes)
+        _forget_evaluations(record, parts, anew=anew, notes=notes)
         if not parts.learner.problem.trained:
             for table in OF_MODEL:
                 record.replace_rows(table, ())
@@ -179,19 +200,24 @@ def _reopened(path: Path, about: dict[str, Any], dims: Dims, parts: RunParts, no
     return record
 
 
-def _forget_evaluations(
-    record: Record, config: Config, ended_early: list[Any] | None, *, anew: bool, notes: list[str]
-) -> None:
+def has_ended(record: Record, parts: RunParts) -> bool:
+    """Whether no movement is left to make, or to make again for a hook."""
+    ended = record.movements >= parts.config.movements or record.about["ended_early"] is not None
+    return ended and not any(hook.needs_episodes for hook in parts.hooks)
+
+
+def _forget_evaluations(record: Record, parts: RunParts, *, anew: bool, notes: list[str]) -> None:
     """Drop evaluations that are not requested, and all after the first missing one; with ``anew``, drop all."""
-    made = list(dict.fromkeys(movements for movements, *_ in record.rows("evaluations")))
-    requested = sorted({*config.evaluations, *(ended_early or [])[:1]})
-    kept = [] if anew else [n for n in made if n < config.first_missing(made, requested) and config.due(n, requested)]
+    config, made = parts.config, list(dict.fromkeys(movements for movements, *_ in record.rows("evaluations")))
+    requested = sorted({*config.evaluations, *(record.about["ended_early"] or [])[:1]})
+    first_missing = min(parts.missing(made, requested), default=math.inf)
+    kept = [] if anew else [n for n in made if n < first_missing and parts.due(n, requested)]
     ended = record.about["settings"]["movements"]
     if config.floor_at is None and ended != config.movements:  # this run ends later, so noise is not measured there
         kept = [movements for movements in kept if movements != ended]
     if others := [str(movements) for movements in made if movements not in kept]:
         notes.append(f"evaluations after {', '.join(others)} movements are dropped, or repeated if requested")
-        for table in EVALUATED:
+        for table in EVALUATED[:-1] if has_ended(record, parts) else EVALUATED:  # regions cannot be had again
             record.replace_rows(table, [row for row in record.rows(table) if row[0] in kept])
 
 
@@ -201,7 +227,7 @@ def _refuse_other(record: Record, about: dict[str, Any], dims: Dims) -> set[str]
         raise RunError(f"{record.path} is a life that save_life wrote, not a run; choose another --out")
     before, now = ({**told["settings"], **told["files"]} for told in (record.about, about))
     others = changed_settings(before, now, record.about.get("folder", ""))
-    if changed := [name for name in others if name not in MAY_CHANGE]:
+    if changed := [name for name in others if name not in may_change() and f"{name}_crc32" not in about["files"]]:
         raise RunError(
             f"{record.path.parent} belongs to another configuration: "
             f"{'; '.join(f'{name} was {before.get(name)}, now {now.get(name)}' for name in changed)}. "
@@ -246,14 +272,16 @@ def versions_of(parts: RunParts) -> dict[str, Any]:
 
 
 def sources(config: Config, robot: Environment) -> dict[str, str]:
-    """File and checksum of each part that is the user's own code, such as "toss.py, crc32 8f0a1b2c", and of a model."""
+    """File and checksum of the module of each part of the user's own, such as "toss.py, crc32 8f0a1b2c", and of its
+    robot's files."""
     files = robot.files if isinstance(robot, FromFiles) else ()
     root = os.path.commonpath([path.parent for path in files]) if files else ""
     checksums = {f"file {path.relative_to(root)}": f"crc32 {checksum(path)}" for path in files}
-    if words := code_of(config.settings):
-        from sgimd_torch.runs.own_code import sources_of  # most runs have no code of the user's
-
-        checksums |= {f"source of {name}": f"{path.name}, crc32 {checksum(path)}" for name, path in sources_of(words)}
+    for word in code_of(config.settings):
+        spec = importlib.util.find_spec(word.partition(":")[0])
+        if spec is not None and spec.has_location and spec.origin:
+            path = Path(spec.origin)
+            checksums[f"source of {word}"] = f"{path.name}, crc32 {checksum(path)}"
     return checksums
 
 
@@ -261,4 +289,4 @@ def code_of(settings: Mapping[str, Any]) -> list[str]:
     """Places ``package.module:attribute`` in ``settings`` that are a user's own code."""
     named = [value for name, value in settings.items() if name.rpartition(".")[2] in CODE]
     words = [word for value in named for word in (value if isinstance(value, list) else [value])]
-    return sorted({word for word in words if isinstance(word, str) and ":" in word and word not in PLACES})
+    return sorted({word for word in words if isinstance(word, str) and ":" in word and word not in OURS})

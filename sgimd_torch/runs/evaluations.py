@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from sgimd_torch.evaluation import Evaluation, evaluate
-from sgimd_torch.options.build import RunParts
 from sgimd_torch.options.config import OWN
 from sgimd_torch.record import Record
+from sgimd_torch.runs.run_parts import RunParts
 
 ByInverse = Mapping[str, Evaluation]
 """The evaluation of each inverse model, by name, the run's own inverse model first."""
@@ -28,11 +28,13 @@ class Evaluations:
     Args:
         parts: parts of the run; their ``inverses`` are evaluated.
         record: record of the run; movements of an evaluation are not recorded.
+        with_regions: whether the record gets the present regions of the goal model at each new evaluation.
         between: function to call between movements of an evaluation; it may raise `KeyboardInterrupt`.
     """
 
     parts: RunParts
     record: Record
+    with_regions: bool = True
     between: Callable[[], object] = bool
 
     def __post_init__(self) -> None:
@@ -50,10 +52,9 @@ class Evaluations:
         return self._by_movements[max(self._by_movements)][OWN] if self._by_movements else None
 
     @property
-    def first_missing(self) -> float:
-        """Number of movements before the first requested evaluation that is not in the record; infinite: none."""
-        config = self.parts.config
-        return config.first_missing(self._by_movements, config.evaluations)
+    def missing(self) -> list[int]:
+        """Numbers of movements before the requested evaluations that are not in the record."""
+        return self.parts.missing(self._by_movements, self.parts.config.evaluations)
 
     def after(self, movements: int) -> ByInverse | None:
         """The recorded evaluation after this number of movements, else a new evaluation of the present learner.
@@ -73,7 +74,7 @@ class Evaluations:
         parts, config = self.parts, self.parts.config
         where = parts.environment, parts.benchmark.goals, config.seed, movements
         floors = (config.movements,) if config.floor_at is None else config.floor_at
-        repeats = config.repeats if config.due(movements, floors) else 0
+        repeats = config.repeats if parts.due(movements, floors) else 0
         own = evaluate(parts.inverses[OWN], *where, repeats=repeats, between=self.between)
         evaluations = {OWN: own}
         for name, inverse in parts.inverses.items():
@@ -93,7 +94,7 @@ class Evaluations:
             columns = errors, evaluation.scatter, evaluation.failed.astype(int), evaluation.expected
             rows = zip(range(len(errors)), *columns, evaluation.contexts, strict=True)
             self.record.add_rows("errors", [(movements, word, *numbers, *context) for *numbers, context in rows])
-        for region in self.parts.learner.regions:
+        for region in self.parts.learner.regions if self.with_regions else ():
             n = len(region.competences)
             results = n, float(region.competences.mean()) if n else np.nan, float(region.interest())
             row = movements, region.path, *region.low, *region.high, region.attempts, *results

@@ -1,7 +1,7 @@
-"""Open a run: its parts are built again from its settings, and its learner repeats its record.
+"""Open a run: its parts are built again from its settings, and its learner gets the exemplars of its record.
 
 learner = load_learner("runs/practice/seed-000"); learner.inverse(context, goal).theta
-run = OpenRun(path); run.replay(300); run.replay(5000)     # the learner after 300 movements, later after 5000
+run = OpenRun(path); run.recall(300); run.recall(5000)     # the learner after 300 movements, later after 5000
 """
 
 from __future__ import annotations
@@ -11,16 +11,17 @@ import os
 from pathlib import Path
 
 from sgimd_torch.learner import Learner
-from sgimd_torch.record import ReplayError
-from sgimd_torch.record.replay import repeated
-from sgimd_torch.runs.directory import RUN_FILE, build_again, changed_versions, sources, versions_of
+from sgimd_torch.record import Record
+from sgimd_torch.runs.directory import RUN_FILE, build_again, changed_versions, sources
+from sgimd_torch.runs.messages import say
 from sgimd_torch.runs.read import config_of, read_run
-from sgimd_torch.runs.run import Listening
-from sgimd_torch.runs.signals import say
+from sgimd_torch.runs.recall import Recalled
 
 
 def load_learner(path: str | os.PathLike[str], *, trust: bool = False) -> Learner:
-    """The learner of a run, as it was after the last recorded movement; it answers goals, and can go on.
+    """The learner of a run after the last recorded movement: it has all exemplars, and answers goals as it did then.
+
+    Its goal model begins anew; ``sgimd run --resume`` goes on with the run itself.
 
     Args:
         path: directory of the run.
@@ -28,15 +29,14 @@ def load_learner(path: str | os.PathLike[str], *, trust: bool = False) -> Learne
 
     Raises:
         RunError: there is no run, it names code of the user and ``trust`` is false, or its record is damaged.
-        ReplayError: the learner does not repeat its record.
     """
     run = OpenRun(path, trust=trust)
-    run.replay()
+    run.recall()
     return run.parts.learner
 
 
 class OpenRun:
-    """A run on disk, finished or still running, whose learner can repeat the recorded movements.
+    """A run on disk, finished or still running, whose learner answers from the recorded movements.
 
     Args:
         path: directory of the run.
@@ -44,7 +44,7 @@ class OpenRun:
 
     Attributes:
         recorded: record of the run, as arrays.
-        parts: parts of the run; the learner has made no movement before ``replay``.
+        parts: parts of the run; the memory of the learner is empty before ``recall``.
 
     Raises:
         RunError: see ``load_learner``.
@@ -57,30 +57,12 @@ class OpenRun:
         now = sources(self.parts.config, self.parts.environment)
         if changes := changed_versions(self.recorded.versions, now):
             say(f"the robot of {path} is not what it was, and moves as it is now: {changes}")
-        self._episodes = repeated(self.parts.learner, Path(path) / RUN_FILE)
+        with Record(Path(path) / RUN_FILE) as record:
+            self._recalled = Recalled(self.parts.learner, record)
 
-    def replay(self, movements: int | None = None) -> None:
-        """Let the learner repeat its record until it has made this number of ``movements``; None: to the end.
+    def recall(self, movements: float = math.inf) -> None:
+        """Give the learner the exemplars of its record up to this number of ``movements``; inf: all.
 
-        Robots that moved at once make the last movements together, so there may be more.
-
-        Raises:
-            ReplayError: the learner does not repeat its record.
+        Robots that moved at once made the last movements together, so there may be more.
         """
-        learner = self.parts.learner
-        last = math.inf if movements is None or movements >= len(self.recorded.index) else movements
-        if learner.movements >= last:
-            return
-        refreshes = [*zip(*(self.recorded.refreshes or {}).values(), strict=True)]
-        for part in learner.problem.trained:
-            if isinstance(part, Listening):
-                part.restore(self.recorded.path, refreshes, (learner.movements, last))
-        try:
-            for episode in self._episodes:
-                for model in learner.problem.trained:
-                    model.refresh(learner.memory)
-                if last <= learner.movements == episode.index + 1:
-                    return
-        except ReplayError as error:
-            changes = changed_versions(self.recorded.versions, versions_of(self.parts))
-            raise ReplayError(f"{error}{f' What differs: {changes}' * bool(changes)}") from error
+        self._recalled.until(movements)

@@ -19,15 +19,16 @@ from numpy.typing import NDArray
 from sgimd_torch.evaluation import OwnGoals
 from sgimd_torch.files import checksum
 from sgimd_torch.learner.events import Kind
-from sgimd_torch.options.config import FILES, OWN, Config
+from sgimd_torch.options.config import OWN, Config
 from sgimd_torch.record import DERIVED, Record, RunError
 from sgimd_torch.record.layout import layout
+from sgimd_torch.rooms import absent, rooms
 from sgimd_torch.runs.directory import (
-    NOT_COMPARED,
     OF_MODEL,
     RUN_FILE,
     changed_settings,
     code_of,
+    not_compared,
     with_found_earlier,
 )
 from sgimd_torch.spaces import Array, Box, Demonstration
@@ -47,10 +48,11 @@ class Run:
         robot: name of the environment's class.
         tolerance: distance, in the unit of T, at which a goal of the learner counts as met.
         spaces: boxes C, Pi and T, by the names "contexts", "policies" and "outcomes".
-        summary: numbers of "movements" and of "failed" movements, whether the run is "finished", seconds by part, and
-            "expected", the mean error that the learner expected when ``--until`` ended the run, or None.
+        summary: numbers of "movements" and of "failed" movements, whether the run is "finished", why it "ended_early",
+            and seconds by part.
         changes: descriptions of the changes of the robot that the learner noticed.
-        remarks: sentences on what the latest outcomes tell of the robot, see `remarks_on`.
+        remarks: sentences of listeners, such as what the latest outcomes tell of the robot.
+        robots, rooms: number of robots that moved at once, and names of the rooms whose words the settings have.
         index: ``(n,)`` numbers of the movements, from 0.
         origin: ``(n,)`` origin of each movement, such as "local" or "imitate"; "" for a rest.
         demonstration: ``(n,)`` indices in ``demonstrations`` of what was shown just before each movement; -1: nothing.
@@ -95,6 +97,8 @@ class Run:
     tolerance: float = float("nan")
     folder: str = ""
     remarks: list[str] = field(default_factory=list)
+    robots: int = 1
+    rooms: list[str] = field(default_factory=list)
 
     @property
     def evaluation(self) -> dict[str, Array]:
@@ -116,7 +120,7 @@ class Run:
 
         Imitations, global exploration, which does not aim at its goal, and failed movements are left out.
         """
-        own_goals = OwnGoals(self.config["at_once"])
+        own_goals = OwnGoals(self.robots)
         own = (
             np.isfinite(self.goals[:, 0])
             & np.isfinite(self.outcomes[:, 0])
@@ -163,7 +167,7 @@ def read_run(path: str | os.PathLike[str]) -> Run:
     evaluated = derived["evaluations"]["movements"]
     is_empty = not demonstrations and not np.isfinite(arrays["outcomes"]).any()  # an empty memory is not evaluated
     with record.translated_errors():
-        end, expected = about["ended_early"] or (settings["movements"], None)
+        end, why = about["ended_early"] or [settings["movements"], ""]
         finished = n == end and (settings["evaluate_at"] == [] or n in evaluated or is_empty)
         return Run(
             path=path,
@@ -173,14 +177,16 @@ def read_run(path: str | os.PathLike[str]) -> Run:
             robot=about["robot"],
             words=about["words"],
             folder=about.get("folder", ""),
-            remarks=[*about.get("remarks", {}).values()],
+            remarks=[text for found in about.get("remarks", {}).values() for text in found.values()],
+            robots=about.get("robots", 1),
+            rooms=about.get("rooms", []),
             tolerance=about.get("tolerance", float("nan")),
             spaces={name: Box(*box) for name, box in about["spaces"].items()},
             summary={
                 "movements": n,
                 "failed": int(arrays["failed"].sum()),
                 "finished": bool(finished),
-                "expected": expected,
+                "ended_early": why,
                 **about.get("seconds", {}),
             },
             **arrays,
@@ -199,13 +205,13 @@ def _lived(record: Record) -> tuple[dict[str, Any], Columns | None]:
     origins, demonstration, cells, requests = list[str](), array("q"), array("d"), list[dict[str, Any]]()
     changes, failed = list[str](), list[bool]()
     lessons = dict[int, int]()  # lessons by number of the next movement of the robot that was shown them
-    for _, kind, origin, *vectors, lesson, who, strategy, reply, place in record.rows("events"):
+    for _, kind, origin, *vectors, lesson, who, strategy, reply, robot, _ in record.rows("events"):
         if lesson is not None:
-            lessons[len(origins) + place] = lesson
+            lessons[len(origins) + robot] = lesson
             if requests and requests[-1]["reply"] == "shown" and requests[-1]["shown"] < 0:
                 requests[-1]["shown"] = lesson
         elif kind == Kind.ASKED and who is not None:
-            asked = {"index": len(origins) + place, "teacher": who, "strategy": strategy, "reply": reply, "shown": -1}
+            asked = {"index": len(origins) + robot, "teacher": who, "strategy": strategy, "reply": reply, "shown": -1}
             wanted = enumerate((*vectors[:c], *vectors[c + p : c + p + t]))
             requests.append(asked | {f"wanted_{k}": value for k, value in wanted})
         elif kind == Kind.CHANGED:
@@ -242,6 +248,8 @@ def config_of(run: Run, *, trust: bool = False) -> Config:
     Raises:
         RunError: the settings name code of the user and ``trust`` is false, or are those of another version.
     """
+    if lost := [room for room in run.rooms if room not in rooms()]:
+        raise RunError(f"{run.path} cannot be opened: {absent(lost[0])}")
     code = code_of(run.config)
     if code and not trust:
         raise RunError(
@@ -256,22 +264,22 @@ def config_of(run: Run, *, trust: bool = False) -> Config:
         raise RunError(f"{told} do not describe a run of this version: {error}") from error
 
 
-def find_runs(place: str | os.PathLike[str]) -> dict[str, list[Path]]:
+def find_runs(folder: str | os.PathLike[str]) -> dict[str, list[Path]]:
     """Run directories of each variant, by name of the variant, in the order of their seeds.
 
     Args:
-        place: directory of a run, folder of a variant, or folder of variants.
+        folder: directory of a run, folder of a variant, or folder of variants.
 
     Raises:
         RunError: there are no runs, or no such folder.
     """
-    place, paths = Path(place), dict[str, list[Path]]()
+    folder, paths = Path(folder), dict[str, list[Path]]()
     for pattern in ("", "seed-*/", "*/seed-*/"):
-        for file in sorted(place.glob(pattern + RUN_FILE)):
+        for file in sorted(folder.glob(pattern + RUN_FILE)):
             paths.setdefault(Path(os.path.abspath(file)).parent.parent.name, []).append(file.parent)
     if not paths:
-        why = "holds no runs" if place.is_dir() else "is a file, not a folder" if place.exists() else "does not exist"
-        raise RunError(f"{place} {why}; runs are in OUT/NAME/seed-000")
+        why = "holds no runs" if folder.is_dir() else "is a file, not a folder" if folder.exists() else "does not exist"
+        raise RunError(f"{folder} {why}; runs are in OUT/NAME/seed-000")
     return paths
 
 
@@ -279,12 +287,11 @@ def finished(config: Config) -> bool:
     """Whether an undamaged run with these settings is on disk, complete with its last evaluation."""
     try:
         run, wanted = read_run(config.directory), with_found_earlier(config).settings
-        others = {*changed_settings(run.config, wanted, run.folder)} - {*NOT_COMPARED}
+        others = {*changed_settings(run.config, wanted, run.folder)} - not_compared()
+        files = {name: config.values.get(name.removesuffix("_crc32")) for name in run.files}
         return bool(run.summary["finished"] and not others) and all(
-            config[name] is None
-            or (name == "begin_with" and not config[name].exists())  # the record has its content
-            or run.files.get(f"{name}_crc32") in (None, checksum(config[name]))
-            for name in FILES
+            path is None or not path.exists() or run.files[name] in (None, checksum(path))
+            for name, path in files.items()
         )
     except (ValueError, OSError):  # another version, or unreadable; --resume will give the reason
         return False

@@ -8,27 +8,26 @@ from __future__ import annotations
 import math
 import time
 import traceback
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
-from typing import Any, Final, Protocol, runtime_checkable
+from typing import Final
 
-from sgimd_torch.environments.protocol import FAILURES, Environment, SimulationError, moves_in_batches, reason_of
-from sgimd_torch.evaluation import Evaluation
+from sgimd_torch.environments.protocol import FAILURES, SimulationError, reason_of
 from sgimd_torch.learner.events import Event, Kind
-from sgimd_torch.options.build import RunParts, task_of
-from sgimd_torch.record import ReplayError, Row, RunError
-from sgimd_torch.runs.directory import open_run
+from sgimd_torch.record import ReplayError, RunError
+from sgimd_torch.runs.directory import has_ended, open_run
 from sgimd_torch.runs.evaluations import Evaluations
-from sgimd_torch.runs.signals import Failed, Progress, Stopped, Stopping, say
-from sgimd_torch.session import Execute, NoOutcomeError, live, run
+from sgimd_torch.runs.hooks import Listener, Listening
+from sgimd_torch.runs.messages import ProgressBar, say
+from sgimd_torch.runs.program import Failed
+from sgimd_torch.runs.run_parts import RunParts
+from sgimd_torch.runs.signals import Stopped, Stopping
+from sgimd_torch.session import NoOutcomeError, live, run
 from sgimd_torch.spaces import Episode
 
 N_TOLD: Final = 3  # number of failures with a message each; later ones are only counted
-LOOKED_BACK: Final = (50, 100, 200)  # numbers of movements at which to test whether the robot has a memory
-REMARK_EVERY: Final = 50  # number of movements between two looks at the outcomes
 COMMIT_EVERY: Final = 1.0  # s between two commits; a killed run loses the movements since the last commit
 
 
@@ -90,22 +89,21 @@ class RunLoop(AbstractContextManager["RunLoop"]):
         say(*parts.notes, *notes)
         self.movements, self.recorded, self.failed, self.told = 0, self.record.movements, 0, 0
         self.seconds = Seconds(self.record.about.get("seconds", {}))
-        self.evaluations = Evaluations(parts, self.record)
         parts.learner.listeners.append(self._hear)
         self.listeners: list[Listener] = []
+        self._recalls = has_ended(self.record, parts)
+        self.evaluations = Evaluations(parts, self.record, with_regions=not self._recalls)
         for part in parts.learner.problem.trained:
-            if isinstance(part, Listening):
-                until = min(self.recorded, self.evaluations.first_missing)
-                part.restore(parts.config.directory, list(self.record.rows("refreshes")), (0, until))
+            if isinstance(part, Listening) and not self._recalls:
+                until = min([self.recorded, *self.evaluations.missing])
+                refreshes = [row for row in self.record.rows("refreshes") if row[0] <= until]
+                part.restore(parts.config.directory, refreshes)
                 self.listeners.append(part.listener(self))
-        if parts.config.board:
-            from sgimd_torch.board.listener import BoardListener  # loaded here, as most runs have no board
-
-            board = BoardListener(parts.config.directory, parts, self.seconds.summary, self._curves)
-            self.listeners.append(board)
+        for hook in parts.hooks:  # one may look for the listeners of those before
+            self.listeners += filter(None, [hook.listener(self)])
         self._wanted = parts.config.evaluations  # numbers of movements before the evaluations to come
         self._committed_at, self._kept, self._warned = time.monotonic(), self.recorded, False  # of the last commit
-        self._remarked = {*self.record.about.setdefault("remarks", {})}  # kinds of remarks that were told
+        self._remarked = {kind for found in self.record.about.setdefault("remarks", {}).values() for kind in found}
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         broken_off = kind is not None and issubclass(kind, KeyboardInterrupt)
@@ -125,7 +123,7 @@ class RunLoop(AbstractContextManager["RunLoop"]):
     @property
     def replaying(self) -> bool:
         """Whether the record is still being replayed."""
-        return self.movements < self.recorded
+        return self.movements < self.recorded and not self._recalls
 
     @property
     def summary(self) -> str:
@@ -139,7 +137,7 @@ class RunLoop(AbstractContextManager["RunLoop"]):
                 result += f" ({last.failed.sum()} of {len(last.failed)} movements of the evaluation failed)"
         failed = f" ({self.failed} failed)" if self.failed else ""
         ended_early = self.record.about["ended_early"]
-        early = f", ended early as it expected {amount(ended_early[1], '.4f')}" if ended_early else ""
+        early = f", ended early as {ended_early[1]}" if ended_early else ""
         return f"{self.parts.config.directory}: {self.movements} movements{failed}, {result}{early}"
 
     def go_on(self, stopping: Stopping) -> None:
@@ -147,7 +145,8 @@ class RunLoop(AbstractContextManager["RunLoop"]):
         total, title = self.parts.config.movements, self.parts.config.title
         unit = self.parts.environment.outcomes.amount
         self.evaluations.between = partial(self._stop_if, stopping)
-        with Progress("replaying" if self.recorded else title, self.recorded or total) as progress:
+        first = "evaluating" if self._recalls else "replaying" if self.recorded else title
+        with ProgressBar(first, self.recorded or total) as progress:
             for _ in self.episodes():
                 last = self.evaluations.last
                 note = "" if last is None else f"error {unit(last.mean_error, '.4f')}"
@@ -158,9 +157,14 @@ class RunLoop(AbstractContextManager["RunLoop"]):
         self.commit()
 
     def episodes(self) -> Iterator[Episode]:
-        """All episodes, one by one: first the recorded ones, then new ones."""
+        """All episodes, one by one: first the recorded ones, then new ones. A finished run has none, unless a hook
+        needs them: its learner gets its exemplars, and missing evaluations are made."""
         parts, config = self.parts, self.parts.config
-        with executing(parts.environment, partial(task_of, config), config.seed, config.at_once) as execute:
+        if self._recalls:
+            self._recall()
+            return
+        in_this_process = nullcontext(live(parts.environment, config.seed))
+        with next(filter(None, (hook.executing(parts) for hook in parts.hooks)), in_this_process) as execute:
             episodes = run(
                 parts.learner,
                 parts.environment,
@@ -171,7 +175,7 @@ class RunLoop(AbstractContextManager["RunLoop"]):
                 execute=self.seconds.of("physics")(execute),
                 record=self.record,
                 failures=config.failures or FAILURES,
-                at_once=config.at_once,
+                at_once=parts.robots,
             )
             if not self.recorded:
                 self._begin()
@@ -181,6 +185,24 @@ class RunLoop(AbstractContextManager["RunLoop"]):
                 yield episode
                 if self._ends_early():
                     return
+
+    def _recall(self) -> None:
+        """Give the learner of a finished run its exemplars, and make missing evaluations."""
+        from sgimd_torch.runs.recall import Recalled  # most runs have not ended yet
+
+        recalled = Recalled(self.parts.learner, self.record)
+        self.evaluations.parts = self._parts_of(self.recorded)
+        for movements in self.evaluations.missing:
+            recalled.until(movements)
+            self.movements = self.parts.learner.movements
+            self._evaluate()
+        recalled.until()
+        self.movements, self.failed = self.recorded, recalled.failed
+        self._begin()
+
+    def _parts_of(self, movements: int) -> RunParts:
+        """The parts of a run that ends after this number of ``movements``."""
+        return replace(self.parts, config=replace(self.parts.config, movements=movements))
 
     @property
     def _all_told(self) -> bool:
@@ -216,7 +238,7 @@ class RunLoop(AbstractContextManager["RunLoop"]):
         if event.kind == Kind.CHANGED and not self.replaying:
             say(str(event.reply))
 
-    def _curves(self) -> dict[str, float]:
+    def curves(self) -> dict[str, float]:
         """Numbers of the listeners for the board since the last call, by tag."""
         return {tag: value for listener in self.listeners for tag, value in listener.curves().items()}
 
@@ -236,55 +258,27 @@ class RunLoop(AbstractContextManager["RunLoop"]):
             self._evaluate()
         if self.movements == self.recorded:
             self._begin()
-        if not replayed and self.movements % REMARK_EVERY == 0:
-            self._remark()
         if not self.replaying and time.monotonic() - self._committed_at >= COMMIT_EVERY:
             self.commit()
 
-    def _remark(self) -> None:
-        """Say what outcomes tell of the robot, each kind once; the record keeps it for tables, reports and answers."""
-        from sgimd_torch.environments.remarks import remarks_on  # a short run looks at nothing
-
-        learner, before = self.parts.learner, self.record.about["remarks"]
-        found = remarks_on(self.parts.environment, learner.memory.outcomes[learner.begun :])
-        if "memory" in before:
-            found["memory"] = before["memory"]
-        elif (text := self._remark_on_memory()) is not None:
-            found["memory"] = text
-        self.record.about["remarks"] = found
+    def remark(self, who: str, found: Mapping[str, str]) -> None:
+        """Say what a listener has noticed, by kind, each kind once; the record keeps its last remarks for all views."""
+        self.record.about["remarks"][who] = found
         say(*(text for kind, text in found.items() if kind not in self._remarked))
         self._remarked |= found.keys()
 
-    def _remark_on_memory(self) -> str | None:
-        """What to say if outcomes depend on the movement before."""
-        config, learner = self.parts.config, self.parts.learner
-        looked = self.movements in LOOKED_BACK and not config.context and config.at_once == 1
-        if not looked or not learner.inverse.says_how_sure:
-            return None
-        from sgimd_torch.changes.carried_over import error_knowing_previous  # short runs do not need it
-
-        with self.seconds.of("learner"):
-            share = error_knowing_previous(learner)
-        if share is None:
-            return None
-        return (
-            f"outcomes depend on the movement before, which would explain {1 - share:.0%} of the error of predictions: "
-            "give it as context (--context previous), or return to the same state before each movement"
-        )
-
     def _ends_early(self) -> bool:
-        """Whether --until ends the run now; then there is a last evaluation."""
-        config = self.parts.config
-        if config.until is None or self.replaying or not self._all_told or self.movements >= config.movements:
+        """Whether a listener ends the run now; then there is a last evaluation."""
+        config, ended = self.parts.config, self.record.about["ended_early"]
+        if self.replaying or not self._all_told or self.movements >= config.movements:
             return False
-        from sgimd_torch.runs.until import ends_now  # few runs end early
-
-        with self.seconds.of("evaluation"):
-            ends = ends_now(self.parts, self.record, self.movements, self.evaluations.between)
-        if ends and config.evaluations:
-            self.evaluations.parts = replace(self.parts, config=replace(config, movements=self.movements))
+        if ended is None:
+            why = next(filter(None, (listener.ends() for listener in self.listeners)), "")
+            ended = self.record.about["ended_early"] = [self.movements, why] if why else None
+        if ended and config.evaluations:
+            self.evaluations.parts = self._parts_of(self.movements)
             self._evaluate()
-        return ends
+        return ended is not None
 
     def _evaluate(self) -> None:
         with self.seconds.of("evaluation"):
@@ -301,54 +295,6 @@ class RunLoop(AbstractContextManager["RunLoop"]):
         for listener in self.listeners:
             listener.begin()
         self.commit()
-
-
-class Listener(Protocol):
-    """Listener of a run; it overrides the methods that it needs.
-
-    A resumed run first tells its listeners everything that is in the record.
-    """
-
-    def episode(self, episode: Episode, replayed: bool) -> None:
-        """A movement was made, or replayed."""
-        return
-
-    def evaluated(self, movements: int, evaluations: Mapping[str, Evaluation]) -> None:
-        """The learner was evaluated after ``movements`` movements; ``evaluations`` are by name of the inverse model."""
-        return
-
-    def begin(self) -> None:
-        """The replay of the record is over; before this call, a listener must not change files."""
-        return
-
-    def curves(self) -> Mapping[str, float]:
-        """New numbers for the board since the last call, by tag."""
-        return {}
-
-    def flush(self) -> None:
-        """Write everything to the disk that is still in memory."""
-        return
-
-    def close(self) -> None:
-        """The run has ended, or was stopped."""
-        return
-
-
-@runtime_checkable
-class Listening(Protocol):
-    """A trained part of a learner that has a listener in a run, and checkpoints."""
-
-    def listener(self, loop: RunLoop) -> Listener:
-        """The listener in the run ``loop``."""
-
-    def restore(self, directory: Path, refreshes: Sequence[Row], span: tuple[float, float]) -> None:
-        """Let the replay of the run in ``directory`` load the last usable checkpoint instead of training.
-
-        Args:
-            directory: directory of the run.
-            refreshes: rows of this table in the record of the run.
-            span: the checkpoint was made after more movements than the first number, and at most the second.
-        """
 
 
 class Seconds:
@@ -376,21 +322,3 @@ class Seconds:
     def summary(self) -> dict[str, float]:
         """Seconds by name, as the record stores them."""
         return {f"seconds_{part}": round(seconds, 3) for part, seconds in self._spent.items()}
-
-
-def executing(
-    environment: Environment, make: Callable[[], Any], seed: int, at_once: int
-) -> AbstractContextManager[Execute]:
-    """The function that executes movements: in this process, or in several if that is faster.
-
-    Args:
-        environment: environment of the movements.
-        make: function that makes the environment, or a task with it, in each process.
-        seed: number from which the random streams of the environment come.
-        at_once: number of robots that move at once.
-    """
-    if at_once == 1 or moves_in_batches(environment):
-        return nullcontext(live(environment, seed))
-    from sgimd_torch.runs.at_once import in_processes  # most runs have one robot
-
-    return in_processes(make, seed, at_once)

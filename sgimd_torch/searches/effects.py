@@ -14,6 +14,7 @@ from typing import Final
 import numpy as np
 
 from sgimd_torch.memory import Memory
+from sgimd_torch.memory.exemplars import Exemplars
 from sgimd_torch.spaces import Array, stream
 
 _FIRST: Final = 16  # number of exemplars at the first search for a plateau
@@ -25,7 +26,7 @@ _NEAR: Final = 2.0  # distance from a plateau, in standard deviations, within wh
 _WITHIN: Final = 4.0  # distance from a plateau, in standard deviations, within which all of its points lie
 _ROUNDING: Final = 1e-9  # assumed noise if an environment has none, relative to the spread of outcomes
 _LEAST_NUMBER: Final = 16  # least number of exemplars on a plateau
-_MOST: Final = 0.5  # least share of all exemplars on a plateau when it is found
+_LEAST_SHARE_AT_FIRST: Final = 0.5  # least share of all exemplars on a plateau when it is found
 _LEAST_SHARE: Final = 0.1  # least share later, as more and more movements have an effect
 _DENSE: Final = 0.9  # least share of the points within 4 sd that lie within 2 sd; without a plateau, about half do
 
@@ -41,32 +42,29 @@ class Effects:
     def __init__(self, memory: Memory, outcome_noise: float) -> None:
         self.memory = memory
         self.noise = outcome_noise * np.sqrt(memory.outcome_dim)
-        self._n_searched = 0  # number of exemplars at the last search for a plateau
+        self._due = float(_FIRST)  # number of exemplars at the next search for a plateau
+        while self._due * _GROWTH <= len(memory):
+            self._due *= _GROWTH
         self._plateau: Array | None = None  # (1 + context_dim, outcome_dim)
         self._seen = 0  # number of exemplars that `__call__` has sorted by their distance from the plateau
 
     def __call__(self) -> Memory | None:
         """Memory of the exemplars with an effect, perhaps empty; None if there is no plateau, because then every
         movement has an effect. The memory is a new object after each search for a plateau."""
-        n, size = len(self.memory), float(_FIRST)
-        while size * _GROWTH <= n:
-            size *= _GROWTH
-        if self._n_searched < int(size) <= n:
-            self._n_searched = int(size)
-            self._plateau = self._find_plateau()
-            self._effective = Memory(self.memory.context_dim, self.memory.theta_dim, self.memory.outcome_dim)
-            self._seen = 0
+        n = len(self.memory)
+        while int(self._due) <= n:
+            self._plateau = self._find_plateau(int(self._due))
+            self._due, self._effective, self._seen = self._due * _GROWTH, Exemplars.of(self.memory, slice(0)).memory, 0
         if self._plateau is None:
             return None
-        new = slice(self._seen, n)
-        for row in self._seen + np.flatnonzero(self._distances(self._plateau, new) > _WITHIN * self._scale):
-            self._effective.add(self.memory.contexts[row], self.memory.thetas[row], self.memory.outcomes[row])
+        distances = self._distances(self._plateau, slice(self._seen, n))
+        rows = self._seen + np.flatnonzero(distances > _WITHIN * self._scale)
+        self._effective.extend(*Exemplars.of(self.memory, rows))
         self._seen = n
         return self._effective
 
-    def _find_plateau(self) -> Array | None:
-        """The plateau of the first ``_n_searched`` exemplars; None if they have no plateau."""
-        n = self._n_searched
+    def _find_plateau(self, n: int) -> Array | None:
+        """The plateau of the first ``n`` exemplars; None if they have no plateau."""
         outcomes = self.memory.outcomes[:n]
         self._scale = max(self.noise, _ROUNDING * float(np.sqrt(outcomes.var(axis=0).sum())))
         rng = stream(n, "plateau")
@@ -80,7 +78,7 @@ class Effects:
             within = distances <= _WITHIN * self._scale
             plateau = self._fit(np.flatnonzero(within))
         n_within, n_near = within.sum(), (distances <= _NEAR * self._scale).sum()
-        share = _MOST if self._plateau is None else _LEAST_SHARE
+        share = _LEAST_SHARE_AT_FIRST if self._plateau is None else _LEAST_SHARE
         is_plateau = n_within >= max(_LEAST_NUMBER, share * n) and n_near >= _DENSE * n_within
         return plateau if is_plateau else None
 

@@ -67,7 +67,6 @@ class Returning(Explore):
         if inverse.effects is Inverse.effects:
             problem.remarks.append(f"exploration does not look for effects: {inverse.__name__} does not report them")
 
-    @property
     def share(self) -> float:
         """Probability of a global movement; 1, too, if effects are rare and fewer than 16 movements had one."""
         n = len(self.problem.memory)

@@ -66,7 +66,7 @@ class NelderMead(Search):
     def __call__(self, start: Estimate, goal: Array) -> Generator[Array, Array, None]:
         """Movements around ``start``, theta_g first; the search ends when the simplex has shrunk."""
         policies = self.problem.policies
-        theta = self._place(policies.check("theta of the estimate", start.theta))
+        theta = self._noisy(policies.check("theta of the estimate", start.theta))
         vertices = [theta]
         values = [math.dist(goal, (yield theta))]
         flat = _Flat(theta, self.xatol)
@@ -82,9 +82,9 @@ class NelderMead(Search):
             vertices.append(vertex)
             values.append(math.dist(goal, (yield vertex)))
         simplex = np.array(vertices), np.array(values)
-        yield from _towards(goal, simplex_descent(*simplex, place=self._place, xatol=self.xatol, fatol=self.fatol))
+        yield from _towards(goal, simplex_descent(*simplex, allow=self._noisy, xatol=self.xatol, fatol=self.fatol))
 
-    def _place(self, theta: Array) -> Array:
+    def _noisy(self, theta: Array) -> Array:
         policies, noise = self.problem.policies, self.noise
         return policies.clip(self.rng.normal(theta, noise * policies.sides) if noise else theta)
 
@@ -93,7 +93,7 @@ def simplex_descent(
     vertices: Array,
     values: Array,
     *,
-    place: Callable[[Array], Array] | None = None,
+    allow: Callable[[Array], Array] | None = None,
     xatol: float = 1e-4,
     fatol: float = 1e-4,
 ) -> Generator[Array, float, None]:
@@ -104,9 +104,9 @@ def simplex_descent(
 
     Args:
         vertices: ``(n + 1, dim)``. With n < dim the search stays in the n-dimensional flat through the vertices,
-            unless ``place`` leads out of it.
+            unless ``allow`` leads out of it.
         values: ``(n + 1,)``.
-        place: function that moves a point to an allowed one, for example into a box; None: no change. (If ``place``
+        allow: function that moves a point to an allowed one, for example into a box; None: no change. (If ``allow``
             only clips, a simplex with all vertices on one face of the box cannot leave this face.)
         xatol: largest difference of the vertices from the best vertex, in any coordinate, at which the descent ends if
             the condition of ``fatol`` holds, too.
@@ -127,7 +127,7 @@ def simplex_descent(
     def beyond(centre: Array, distance: float) -> Array:
         """The point at ``distance`` on the line through the worst vertex (at -1) and the others' ``centre`` (at 0)."""
         point = (1 + distance) * centre - distance * vertices[-1]
-        return point if place is None else place(point)
+        return point if allow is None else allow(point)
 
     while np.abs(vertices[1:] - vertices[0]).max() > xatol or np.abs(values[0] - values[1:]).max() > fatol:
         centre = np.add.reduce(vertices[:-1], axis=0) / n
@@ -151,7 +151,7 @@ def simplex_descent(
         else:
             for j in range(1, n + 1):
                 shrunk = vertices[0] + 0.5 * (vertices[j] - vertices[0])
-                vertices[j] = shrunk if place is None else place(shrunk)
+                vertices[j] = shrunk if allow is None else allow(shrunk)
                 values[j] = yield vertices[j]
         order = values.argsort(kind="stable")
         vertices, values = vertices[order], values[order]

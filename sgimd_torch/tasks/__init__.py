@@ -60,7 +60,7 @@ def benchmark_of(task: Task, file: Path | None) -> tuple[Benchmark, list[str], s
     elif source is not None:
         benchmark = source()
     else:
-        from sgimd_torch.runs.tasks.goals import goals_for  # most tasks bring goals
+        from sgimd_torch.tasks.goals import goals_for  # most tasks bring goals
 
         benchmark, where = goals_for(robot)
         notes.append(f"{type(robot).__name__} has no benchmark goals: evaluations use {where}")

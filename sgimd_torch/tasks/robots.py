@@ -9,8 +9,8 @@ import numpy as np
 
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import Benchmark, grid_over, tile_goals
-from sgimd_torch.runs.tasks import Task
 from sgimd_torch.spaces import Demonstration, stream
+from sgimd_torch.tasks import Task
 
 SIDE: Final = 0.1  # m, side of a benchmark tile; the disc of radius 1 m that an arm reaches has 311 goals
 N_DEMONSTRATIONS: Final = 127  # number of an arm's demonstrations, equal to that of the rod's demonstrators

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from sgimd_torch.calls import with_keywords_of
 from sgimd_torch.demonstrations import SHIPPED as SHIPPED_DEMONSTRATIONS
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.evaluation import SHIPPED as SHIPPED_BENCHMARK
-from sgimd_torch.options.signature import with_keywords_of
-from sgimd_torch.runs.tasks import Task
 from sgimd_torch.spaces import Box, Demonstration
+from sgimd_torch.tasks import Task
 
 
 @with_keywords_of(FishingRod, "noise", "max_wind")

@@ -14,8 +14,8 @@ from sgimd_torch.demonstrations.fit import misfit_of, slow_clock
 from sgimd_torch.environments.protocol import Translating, primitive_of
 from sgimd_torch.files import checksum
 from sgimd_torch.learner import Correspondence
-from sgimd_torch.runs.tasks import Task
 from sgimd_torch.spaces import Array, Demonstration
+from sgimd_torch.tasks import Task
 
 FASTER: Final = 3.0  # ratio of durations, shortest movement to recording; a larger ratio means times in a wrong unit
 TOO_FAR: Final = 0.25  # share of a joint's range; a recording with a larger misfit is refused

@@ -4,34 +4,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
-from tensorboard.plugins.hparams.metadata import (
-    EXPERIMENT_TAG,
-    SESSION_START_INFO_TAG,
-    parse_experiment_plugin_data,
-    parse_session_start_info_plugin_data,
-)
 from tensorboardX import summary
 
-from boards import board_of, curves_of, pictures_of
+from boards import board_of, curves_of, hparams_of
 from own import MODULE
 from runs import content_of
-from sgimd_torch import InterestMap, stream
-from sgimd_torch.board import pictures
-from sgimd_torch.board.curves import Behaviour, OwnRegions, branches, evaluation_curves, region_curves
+from sgimd_torch import stream
+from sgimd_torch.board.curves import Behaviour, OwnRegions, evaluation_curves, region_curves
 from sgimd_torch.board.legend import LEGEND
 from sgimd_torch.board.listener import EventFile
 from sgimd_torch.competence import performance
 from sgimd_torch.evaluation import Benchmark, Evaluation, save_benchmark
-from sgimd_torch.figures.sections import sections
-from sgimd_torch.options.command_line import main
-from sgimd_torch.runs import sweep
+from sgimd_torch.runs.command import main
+from sgimd_torch.runs.program import command
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.runs.signals import command
 from sgimd_torch.spaces import Box, Demonstration, Episode, Move, Request
-from worlds import problem
+from worlds import PLANE, interest_map, problem
 
-PLANE = Box.cube(-1.0, 1.0, 2, names=("x", "y"), unit="m")
 GOAL, NEAR, FAR = np.array([0.5, 0.5]), np.array([0.5, 0.51]), np.array([0.5, 0.9])  # near: within the tolerance
 SHOWN = Demonstration(np.zeros(0), np.arange(2.0), np.zeros((2, 1)), np.array([-0.5, 0.5]))
 
@@ -46,15 +35,6 @@ def evaluation(errors):
     nothing = np.full((len(errors), 0), np.nan)
     unknown = np.full(len(errors), np.nan)
     return Evaluation(errors, nothing, nothing, np.full(len(errors), 0.01), nothing, errors < 0, unknown)
-
-
-def interest_map(n=400, space=PLANE, context=(), worst=-1.0):
-    goals = InterestMap(problem(contexts=Box.cube(-1, 1, len(context)), outcomes=space))
-    rng = stream(0, "competence")
-    for _ in range(n):
-        goal = goals.sample(context)
-        goals.add(context, goal, worst * rng.random() if goal[0] > 0 else -0.1)
-    return goals
 
 
 def behaviour_of(*movements, at_once=1):
@@ -151,36 +131,6 @@ def test_the_share_of_goals_met_is_counted():
     assert (values["error/mean"], values["error/noise_floor"]) == pytest.approx((0.065, 0.01))
 
 
-def test_the_names_of_regions_lie_where_they_are_and_are_those_of_the_curves():
-    regions = interest_map().regions
-    ax = Figure().add_subplot()
-    pictures._competence(ax, regions, *sections(PLANE))
-    named = branches(regions)
-    places = {text.get_text(): text.get_position() for text in ax.texts}
-    assert places.keys() == {path for path in named if not {f"{path}0", f"{path}1"} & named.keys()}
-    for path, (x, y) in places.items():
-        assert any((r.low <= [x, y]).all() and ([x, y] <= r.high).all() for r in named[path])
-
-
-@pytest.mark.parametrize(
-    ("high", "context", "worst"),
-    [((1.0, 1.0), (), -1.0), ((4.0, 0.8), (), -1.0), ((4.0, 1.73), (0,), -0.6), ((0.7, 0.98), (), -1.0)],
-)
-def test_pictures_tell_small_errors_apart_and_cut_off_no_label(high, context, worst):
-    space = Box(np.array([-0.3, -0.42]), np.array(high), ("tip x", "tip y"), "m")
-    goals = space.low + space.sides * stream(0, "goals").random((4, 2))
-    regions, contexts = interest_map(space=space, context=context, worst=worst).regions, Box.cube(0, 1, len(context))
-    drawn = {}
-    for error in (0.01, 0.02, 0.2):
-        maps = pictures.maps_of(regions, space, contexts, goals, np.array([0.0, error, error, error]))
-        drawn[error] = maps["map/error"]
-        for pixels in maps.values():
-            assert all((edge == 255).all() for edge in (pixels[0], pixels[-1], pixels[:, 0], pixels[:, -1]))
-    half = drawn[0.01].shape[1] // 2
-    for less, more in ((0.01, 0.02), (0.02, 0.2)):
-        assert (drawn[less] != drawn[more])[40:, :half].any()  # below the title, left of the colour bar
-
-
 def test_earlier_event_files_stay_until_the_replay_is_over(tmp_path):
     def told(*points, begins_after=0):
         file = EventFile(tmp_path)
@@ -227,9 +177,6 @@ def test_the_curves_of_a_run_are_those_of_its_record(watched):
     shown = {step: (read.demonstration[:step] >= 0).sum() for step in (50, 100, 150)}
     assert curves["teacher/demonstrations"] == shown
     assert curves["competence/R"].keys() == curves["time/physics"].keys() == {50, 100, 150}
-    pictures = pictures_of(watched)
-    assert all(png.startswith(b"\x89PNG") for png in pictures["map/error"].values())
-    assert pictures["map/error"].keys() == {60, 120, 160}  # when the movements have doubled, and at the end
 
 
 @pytest.mark.filterwarnings("ignore:The inplace keyword:DeprecationWarning")  # of tbparse 0.0.9, in pandas 3.1
@@ -241,42 +188,17 @@ def test_other_readers_find_every_curve(watched):
 
 def test_every_tag_is_explained_in_the_file_with_its_unit_and_in_the_legend(watched):
     board = board_of(watched)
-    for tag in (*board.Tags()["scalars"], *board.Tags()["images"]):
+    for tag in board.Tags()["scalars"]:
         assert board.SummaryMetadata(tag).summary_description
     assert "(m)" in board.SummaryMetadata("error/mean").summary_description
     (page,) = board.Tensors("about/legend/text_summary")
     assert all(f"**{tag}" in page.tensor_proto.string_val[0].decode() for tag in LEGEND)
 
 
-def hparams_of(directory):
-    board = board_of(directory)
-    start = parse_session_start_info_plugin_data(board.SummaryMetadata(SESSION_START_INFO_TAG).plugin_data.content)
-    values = {name: value.string_value or value.number_value for name, value in start.hparams.items()}
-    about = parse_experiment_plugin_data(board.SummaryMetadata(EXPERIMENT_TAG).plugin_data.content)
-    assert {info.name for info in about.hparam_infos} == values.keys()
-    return values, [info.name.tag for info in about.metric_infos]
-
-
-@pytest.mark.slow
-def test_hyperparameters_of_a_sweep_are_what_tells_its_runs_apart_defaults_included(own):
-    words = "--environment planar-arm-7 --movements 50 --seeds 0 --repeats 0 --board true --out sweep"
-    vary = ["--vary", "algorithm=sagg-riac,practice", "--vary", "budget=1,15"]  # 1 is the default of practice
-    assert command(sweep.main, [*words.split(), *vary]) == 0
-    found = {path.parent.name: hparams_of(path) for path in Path("sweep").glob("*/seed-000")}
-    assert found == {
-        f"{algorithm},budget={budget}": (
-            {"algorithm": algorithm, "budget": budget, "environment": "planar-arm-7", "seed": 0},
-            ["error/mean"],
-        )
-        for algorithm in ("sagg-riac", "practice")
-        for budget in (1, 15)
-    }
-
-
 def assert_same_board(directory, whole):
     """By tag, step and value; but for seconds, which a replayed movement does not have."""
     found, wanted = (
-        {tag: curve for tag, curve in {**curves_of(each), **pictures_of(each)}.items() if not tag.startswith("time/")}
+        {tag: curve for tag, curve in curves_of(each).items() if not tag.startswith("time/")}
         for each in (directory, whole)
     )
     assert found == wanted
@@ -293,7 +215,11 @@ def test_without_evaluations_there_are_curves_of_the_learners_own_goals_and_of_f
     assert hparams_of(directory)[1] == ["goals/missed_by"]
 
 
-@pytest.mark.parametrize("algorithm", ["practice", "practice-taught", "sagg-riac", "sgim-d", "random"])
+SOME = ["practice-taught", "sagg-riac", "random"]
+MORE = [pytest.param(algorithm, marks=pytest.mark.slow) for algorithm in ("practice", "sgim-d")]
+
+
+@pytest.mark.parametrize("algorithm", [*SOME, *MORE])
 def test_a_board_changes_no_byte_of_its_run_and_shows_it_from_the_first_movement_also_after_a_resume(own, algorithm):
     """Regions, too: every learner with goals has competence per region, and others say that they have none."""
     save_benchmark("few.npz", Benchmark("PlanarArm", np.array([[0.5, 0.5], [-0.3, 0.2]]), 0.1))
@@ -317,11 +243,10 @@ def test_a_board_changes_no_byte_of_its_run_and_shows_it_from_the_first_movement
 
 
 @pytest.mark.parametrize("robot", ["sliders:Slider", "sliders:Slider3", "sliders:Shifted", "formula:Slider2"])
-def test_outcomes_of_any_dimension_or_named_like_a_formula_have_curves_and_pictures(own, module, robot):
+def test_outcomes_of_any_dimension_or_named_like_a_formula_have_curves(own, module, robot):
     named = "self.outcomes = Box(-np.ones(2), 3 * np.ones(2), ('$\\\\frac{$', '$x_$'), '$\\\\frac{$')"
     module("formula", MODULE.replace("        self.rest", f"        {named}\n        self.rest", 1))
     words = f"--environment {robot} --algorithm sagg-riac --movements 60 --evaluate-at 30 --repeats 0 --out runs"
     assert command(main, [*words.split(), "--board", "true"]) == 0
     directory = Path("runs/sagg-riac/seed-000")
     assert {"error/mean", "competence/R", "interest/R", "goals/missed_by"} < curves_of(directory).keys()
-    assert pictures_of(directory).keys() == {"map/error", "map/competence"}

@@ -11,9 +11,9 @@ from hypothesis.extra.numpy import arrays
 from sgimd_torch.demonstrations import SHIPPED, load_demonstrations, save_demonstrations
 from sgimd_torch.demonstrations.fit import misfit_of
 from sgimd_torch.environments.fishing_rod import JOINT_RANGES, FishingRod
-from sgimd_torch.runs.tasks.rod import fishing_rod
-from sgimd_torch.runs.tasks.taught import demonstrations_of
 from sgimd_torch.spaces import Demonstration, stream
+from sgimd_torch.tasks.rod import fishing_rod
+from sgimd_torch.tasks.taught import demonstrations_of
 
 FIELDS = ("context", "times", "trajectory", "outcome")
 DIMENSIONS = st.integers(0, 3), st.integers(1, 4), st.integers(1, 3)

@@ -11,7 +11,7 @@ import pytest
 
 from arms import on_table, write
 from sgimd_torch.__main__ import _call
-from sgimd_torch.runs.signals import command
+from sgimd_torch.runs.program import command
 
 SO101 = ("shoulder_pan", "shoulder_lift", "elbow_flex")
 ROOT = Path(__file__).parents[2]
@@ -52,6 +52,7 @@ def test_the_camera_sees_a_puck_in_a_stream_of_pictures_to_two_millimetres():
         camera["puck"]({"above": np.zeros((480, 640), np.uint8)})
 
 
+@pytest.mark.slow
 def test_the_page_leads_from_the_simulator_to_a_goal_on_the_table(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("sys.stdin", io.StringIO("\n"))

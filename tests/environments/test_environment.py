@@ -1,8 +1,6 @@
 """The environment protocol, and the planar arm whose reachable set and inverse are known exactly."""
 
-import os
 import pickle
-import sys
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -13,8 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 
-from sgimd_torch.environments.check import check_environment
-from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.protocol import (
     BatchEnvironment,
@@ -74,27 +70,6 @@ def executed(environment: Environment) -> list[Array | Failure]:
     return execute_many(environment, np.empty((2, 0)), THETAS, RNGS)
 
 
-environments = pytest.mark.parametrize(
-    "environment",
-    [
-        PlanarArm(),
-        PlanarArm(2),
-        PlanarArm(noise=0.02, context=True),
-        PlanarArm(context=True, outcomes=Box.cube(-100, 100, 2)),
-        Slope(),
-        FAST,
-        FishingRod(),
-        FishingRod(max_wind=0.02),
-    ],
-    ids=["arm", "two joints", "noise and context", "large task space", "user's", "user's batches", "rod", "windy rod"],
-)
-
-
-@environments
-def test_environment_keeps_the_contract(environment):
-    check_environment(environment)
-
-
 def test_a_batch_is_executed_at_once_where_the_environment_can():
     batches: list[int] = []
 
@@ -140,8 +115,6 @@ def test_what_a_parent_does_with_a_batch_does_not_count_for_an_execute_of_ones_o
 def test_what_a_mask_hides_is_no_outcome():
     hiding = slope(execute_many=together(2, lambda outcomes: np.ma.masked_array(outcomes, outcomes > 1.4)))
     assert all("got a masked array" in outcome.reason for outcome in executed(hiding))
-    with pytest.raises(ValueError, match="got MaskedArray; raise SimulationError where there is no outcome"):
-        check_environment(hiding)
 
 
 def test_an_outcome_in_a_batch_that_is_not_finite_is_a_failure_of_its_movement_alone():
@@ -267,36 +240,3 @@ CHAIN, TAU = np.zeros((5, 3, 2)), np.zeros(2)
 def test_what_makes_no_sense_is_refused(call: Callable[[], object], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         call()
-
-
-class Forking(PlanarArm):
-    """A robot that forks a process, which ends in some way; it tells with which exit code."""
-
-    def __init__(self, end, code):
-        super().__init__(2)
-        self.end, self.code, self.owner = end, code, os.getpid()
-
-    def execute(self, context, theta, rng):
-        child = os.fork()
-        if not child:
-            self.end()
-            return np.zeros(2)
-        assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == self.code
-        return super().execute(context, theta, rng)
-
-    def execute_many(self, contexts, thetas, rngs):
-        return np.stack([self.execute(*movement) for movement in zip(contexts, thetas, rngs, strict=True)])
-
-
-@pytest.mark.filterwarnings("ignore:This process .* is multi-threaded:DeprecationWarning")
-@pytest.mark.parametrize("n", [1, 2])
-@pytest.mark.parametrize(
-    ("end", "code"),
-    [(partial(sys.exit, 3), 3), (sys.exit, 0), (partial(sys.exit, "ill"), 1), (dict, 0), (lambda: 1 / 0, 1)],
-)
-def test_a_process_that_a_robot_forks_never_goes_on_with_the_run(end, code, n):
-    robot, owner = Forking(end, code), os.getpid()
-    outcomes = execute_many(robot, np.zeros((n, 0)), np.full((n, 2), 0.5), [stream(0, "x", k) for k in range(n)])
-    if os.getpid() != owner:
-        os._exit(99)
-    assert [outcome.shape for outcome in outcomes] == [(2,)] * n

@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sgimd_torch.environments.controllers import Sinusoids
 from sgimd_torch.environments.motor_primitives import GaussianPrimitive
 from sgimd_torch.spaces import Array, Box, stream
 
@@ -116,31 +115,6 @@ def test_a_demonstration_is_played_at_its_own_pace_or_the_fastest_allowed(durati
     assert found[:-1] == pytest.approx(theta[:-1], abs=1e-6)  # the shape is kept
 
 
-def swinging(frequencies: tuple[float, float] = (0.2, 2.0)) -> Sinusoids:
-    return Sinusoids(Box(np.array([-1.0, 0.0]), np.array([1.0, 4.0])), frequencies)
-
-
-TIMES = 0.05 * np.arange(100)
-
-
-def test_a_sinusoid_has_the_amplitude_phase_offset_and_frequency_of_its_theta() -> None:
-    theta = np.array([0.5, 0.25, 0.5, 0.0, 0.0, 1.0, 0.5])  # half a range from its top; still, at .5 above the middle
-    commands = swinging((0.5, 1.5)).at(theta, np.array([0.0, 0.25, 0.5, 1.0]))  # 1 Hz
-    np.testing.assert_allclose(commands[:, 0], [0.5, 0, -0.5, 0.5], atol=1e-15)
-    np.testing.assert_allclose(commands[:, 1], 3.0)
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_what_a_sinusoid_plays_gives_its_theta_back(seed: int) -> None:
-    theta = 0.25 + 0.5 * swinging().policies.sample(stream(seed, "theta"))  # so that nothing is clipped
-    np.testing.assert_allclose(swinging().correspondence(TIMES, swinging().at(theta, TIMES)), theta, atol=1e-4)
-
-
-def test_a_recording_out_of_range_is_translated_to_the_nearest_sinusoid_in_pi() -> None:
-    theta = swinging().correspondence(TIMES, 10 * np.sin(np.outer(TIMES, [1.0, 2.0])))
-    assert swinging().policies.contains(theta)
-
-
 def lasting(duration: float) -> Array:
     """theta_d of a recording."""
     return primitive().correspondence(np.linspace(0, duration, 10), np.full((10, 2), 0.5))
@@ -158,7 +132,6 @@ def lasting(duration: float) -> Array:
             for x in ((0.0, 1.0), (1.0, 1.0), (2.0, 1.0), (np.nan, 1.0))
         ),
         *((lambda x=x: primitive(sharpness=x), "sharpness") for x in (0.0, np.nan)),
-        (lambda: swinging((2.0, 1.0)), "frequencies"),
     ],
 )
 def test_what_makes_no_sense_is_refused(call: Callable[[], object], message: str) -> None:

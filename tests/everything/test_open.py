@@ -17,21 +17,26 @@ from arms import write
 from boards import curves_of
 from runs import LIVE, start
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.environments.sketch import traced
 from sgimd_torch.evaluation import Benchmark, save_benchmark
-from sgimd_torch.options.build import build
-from sgimd_torch.options.command_line import main, parse
+from sgimd_torch.extras.ask import command as ask
+from sgimd_torch.extras.benchmark import command as benchmark
+from sgimd_torch.extras.film import command as film
+from sgimd_torch.extras.film.traced import traced
+from sgimd_torch.extras.report import command as report
+from sgimd_torch.extras.table import command as table
+from sgimd_torch.extras.teach.command import options_of
+from sgimd_torch.extras.teach.taught import ALONE, TaughtRun
+from sgimd_torch.learner import Learner
+from sgimd_torch.options.config import Config
+from sgimd_torch.options.parse import parse
 from sgimd_torch.record.replay import save_life
+from sgimd_torch.runs.build import build
+from sgimd_torch.runs.command import main
 from sgimd_torch.runs.load import load_learner
+from sgimd_torch.runs.program import command
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.runs.run import RunLoop
-from sgimd_torch.runs.signals import command
 from sgimd_torch.spaces import stream
-from sgimd_torch.teach.command import options_of
-from sgimd_torch.teach.taught import ALONE, TaughtRun
-from sgimd_torch.views import ask, benchmark, table
-from sgimd_torch.views.film import command as film
-from sgimd_torch.views.report import command as report
 from worlds import executed
 
 EARLY = 30
@@ -40,7 +45,7 @@ ROBOTS = """
 import numpy as np
 from sgimd_torch import PlanarArm
 from sgimd_torch.evaluation import Benchmark
-from sgimd_torch.runs.tasks import Task
+from sgimd_torch.tasks import Task
 
 class Failing(PlanarArm):
     def execute(self, context, theta, rng):
@@ -160,6 +165,15 @@ def run(request, lived):
     return lived(request.param)
 
 
+@pytest.fixture
+def answered_from_memory(run, monkeypatch):
+    """Whatever the test does, no movement of the recorded life may be asked for again."""
+    asked = []
+    monkeypatch.setattr(Learner, "ask_many", lambda learner, contexts: asked.append(contexts))
+    yield
+    assert not asked
+
+
 def test_the_runs_are_of_their_kinds(lived):
     """Otherwise the other tests would show nothing."""
     recorded = {kind: read_run(lived(kind).path) for kind in KINDS}
@@ -174,6 +188,7 @@ def test_the_runs_are_of_their_kinds(lived):
     assert recorded["forward model"].refreshes["relative_error"][-1] < 1  # so its answers are asked for
 
 
+@pytest.mark.usefixtures("answered_from_memory")
 def test_the_loaded_learner_is_the_one_that_lived(run):
     learner = load_learner(run.path, trust=True)
     np.testing.assert_array_equal(answers_of(replace(run.parts, learner=learner)), run.answers)
@@ -184,7 +199,7 @@ def test_a_run_of_relative_paths_and_own_code_is_opened_from_another_folder(tmp_
     for name in ("one", "other"):
         (tmp_path / name).mkdir()
     (tmp_path / "one/placed.py").write_text(
-        "from pathlib import Path\nfrom sgimd_torch.environments.mujoco_robot import MujocoRobot\n"
+        "from pathlib import Path\nfrom sgimd_torch.extras.models.mujoco_robot import MujocoRobot\n"
         "def make(*, file: Path = Path(), **more):\n    return MujocoRobot(file, outcome='site:tip:xy')\n"
     )
     write(tmp_path / "one/arm.xml")
@@ -211,6 +226,7 @@ def test_a_run_of_relative_paths_and_own_code_is_opened_from_another_folder(tmp_
     assert "environment.model was ../one/arm.xml, now arm.xml" in capsys.readouterr().err
 
 
+@pytest.mark.usefixtures("answered_from_memory")
 def test_ask_gives_the_movements_of_the_learner_that_lived(run, tmp_path):
     (tmp_path / "goals.csv").write_text("\n".join(f"{x},{y}" for x, y in GOALS))
     words = [str(run.path), "--trust", f"--goals={tmp_path}/goals.csv", f"--out={tmp_path}/answers.csv"]
@@ -220,6 +236,7 @@ def test_ask_gives_the_movements_of_the_learner_that_lived(run, tmp_path):
     np.testing.assert_array_equal(thetas, run.answers)
 
 
+@pytest.mark.usefixtures("answered_from_memory")
 @pytest.mark.parametrize("run", some("taught", "prior", "noticed change", "forward model"), indirect=True)
 def test_a_film_shows_the_learner_that_lived_early_and_at_the_end(run, tmp_path, capsys):
     goal, last = ",".join(map(str, GOALS[0])), run.parts.learner.movements
@@ -245,7 +262,7 @@ def test_teaching_goes_on_with_the_learner_that_lived_or_says_that_it_learns_alo
 
 
 def test_a_resumed_run_has_the_learner_that_lived_and_the_board_its_errors(run):
-    parts = build(replace(run.parts.config, board=True))
+    parts = build(Config.from_settings({**run.parts.config.settings, "board": True}))
     with RunLoop(parts, resume=True) as life:
         for _ in life.episodes():
             pass
@@ -254,6 +271,7 @@ def test_a_resumed_run_has_the_learner_that_lived_and_the_board_its_errors(run):
     assert curves_of(run.path)["error/mean"][parts.learner.movements] == pytest.approx(run.error, rel=1e-6)
 
 
+@pytest.mark.usefixtures("answered_from_memory")
 def test_the_table_shows_the_error_of_the_learner_that_lived(run, capsys):
     assert command(table.main, [str(run.path), "--format=csv"]) == 0
     (row,) = csv.DictReader(io.StringIO(capsys.readouterr().out))
@@ -261,6 +279,7 @@ def test_the_table_shows_the_error_of_the_learner_that_lived(run, capsys):
     assert error == run.error
 
 
+@pytest.mark.usefixtures("answered_from_memory")
 @pytest.mark.parametrize("run", some("plain", "failures"), indirect=True)
 def test_the_report_shows_the_error_of_the_learner_that_lived(run):
     assert command(report.main, [str(run.path)]) == 0
@@ -281,6 +300,7 @@ def test_a_change_is_said_recorded_and_reported_once(files, tmp_path, capsys):
     assert said not in capsys.readouterr().err
 
 
+@pytest.mark.usefixtures("answered_from_memory")
 def test_a_benchmark_is_made_of_the_outcomes_of_the_learner_that_lived(run, tmp_path, capsys):
     assert command(benchmark.main, [str(run.path), f"--out={tmp_path}/goals.npz", "--tiles=4"]) == 0
     lived = len(run.parts.learner.memory)

@@ -11,10 +11,10 @@ import pytest
 from own import MODULE
 from runs import write_about
 from sgimd_torch.__main__ import _call
-from sgimd_torch.options.command_line import main as live
 from sgimd_torch.record import Record
+from sgimd_torch.runs.command import main as live
 from sgimd_torch.runs.directory import RUN_FILE
-from sgimd_torch.runs.signals import command
+from sgimd_torch.runs.program import command
 
 REFUSALS = Path(__file__).parent / "refusals.txt"
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from sgimd_torch.views import statistics
+from sgimd_torch.extras.table import statistics
 
 
 @pytest.fixture

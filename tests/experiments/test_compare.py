@@ -13,13 +13,13 @@ from runs import ROOT, start
 from sgimd_torch import run, sgim_d_letter
 from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.evaluation import Benchmark
-from sgimd_torch.options.build import build
-from sgimd_torch.options.command_line import parse
+from sgimd_torch.extras.sweep.parallel import Machine, sweep
 from sgimd_torch.options.config import Config, words
+from sgimd_torch.options.parse import parse
 from sgimd_torch.record import RunError
-from sgimd_torch.runs.parallel import Machine, sweep
+from sgimd_torch.runs.build import build
+from sgimd_torch.runs.program import command
 from sgimd_torch.runs.read import Run, read_run
-from sgimd_torch.runs.signals import command
 from table import CORNER, LEARNING, explored_rows, merge, read_table, result_rows, task_name, tiles_reached
 from variants import EXPERIMENTS, MADE, VARIANTS, make_subsets
 
@@ -29,8 +29,8 @@ import sys
 sys.path.insert(0, "EXPERIMENTS")
 import variants
 from pathlib import Path
-from sgimd_torch.runs.parallel import Machine, sweep
-from sgimd_torch.runs.signals import command
+from sgimd_torch.extras.sweep.parallel import Machine, sweep
+from sgimd_torch.runs.program import command
 tiny = dict(movements=40, evaluate_at=(20,), repeats=2, benchmark=Path(sys.argv.pop(1)))
 variants.EXPERIMENTS.clear()
 variants.EXPERIMENTS["paper"] = {"random": dict(algorithm="random", **tiny)}
@@ -62,6 +62,7 @@ def ended(process):
     return process.returncode, said, errors
 
 
+@pytest.mark.slow
 def test_each_evaluation_is_a_row_the_failed_are_reported_and_a_second_start_does_nothing(compare, tmp_path):
     code, _, errors = ended(compare("paper", "large", "model", "broken"))
     assert code == 1

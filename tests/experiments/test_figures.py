@@ -9,8 +9,8 @@ from figures import FIGURES, main
 from made_lives import write_lives
 from made_up import MOVEMENTS, write_rows
 from page_tables import GAIN
-from sgimd_torch.figures.names import COLOURS, NAMES
-from sgimd_torch.runs.signals import command
+from sgimd_torch.extras.table.names import COLOURS, NAMES
+from sgimd_torch.runs.program import command
 
 NOT_MADE_UP = ("middle", "middle-process")
 pytestmark = pytest.mark.usefixtures("few_draws")

@@ -6,7 +6,7 @@ import pytest
 from evidence import Evidence, movements_to_reach
 from judging import Claim, at_least, at_most, holm, judge
 from made_up import row, write, write_rows
-from sgimd_torch.views.statistics import Interval
+from sgimd_torch.extras.table.statistics import Interval
 
 
 def number(value, low, high):

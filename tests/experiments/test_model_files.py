@@ -4,7 +4,7 @@ import pytest
 
 import model_files
 from model_files import REFUSED, RIGHT, WARNED, File, main
-from sgimd_torch.runs.signals import command
+from sgimd_torch.runs.program import command
 from table import read_table
 
 ARM = """<mujoco><option gravity="0 0 0" integrator="implicitfast"/><worldbody><body><joint name="turn" range="-90 90"/>

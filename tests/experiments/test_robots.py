@@ -19,7 +19,7 @@ from random_robots import COUNTS, FAMILIES, LEARNERS, RandomRobot, kind
 from runs import ROOT
 from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.runs.parallel import Machine, sweep
+from sgimd_torch.extras.sweep.parallel import Machine, sweep
 from table import LEARNING, read_table
 
 
@@ -159,6 +159,7 @@ def test_model_files_are_counted_by_what_is_told_and_errors_on_them_compared(tmp
     assert "errs 0.80 times as much as random movements in the mean of 1, worse by its interval on 0." in said
 
 
+@pytest.mark.slow
 def test_a_life_is_a_job_that_leaves_the_rows_of_its_table(tmp_path, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
     life = Life("robots.csv", (501, "random", 3), COUNTS[-1], tmp_path)

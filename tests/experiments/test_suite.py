@@ -2,11 +2,11 @@
 
 import pytest
 
-from sgimd_torch.options.build import task_of
 from sgimd_torch.options.config import Config
+from sgimd_torch.runs.plan import task_of
+from sgimd_torch.runs.program import command
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.runs.signals import command
-from sgimd_torch.runs.tasks.goals import goals_all_over
+from sgimd_torch.tasks.goals import goals_all_over
 from suite import RANDOM, TASKS, UNIFORM, main, parsed_options, runs_of
 
 SHORT = ("--movements", "20", "--evaluate-at", "20", "--processes", "1")
@@ -57,6 +57,7 @@ def test_what_is_varied_gives_a_learner_for_each_value():
     assert [config.variant for config in configs] == [RANDOM, UNIFORM, "inverse=process", "inverse=nearest"]
 
 
+@pytest.mark.slow
 def test_a_suite_is_run_shown_and_gone_on_with(tmp_path, capsys):
     out = tmp_path / "study"
     words = ("--tasks", "toss", "--out", out, *LEARNER, *SHORT)

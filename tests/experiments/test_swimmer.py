@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from sgimd_torch.demonstrations.fit import misfit_of
-from sgimd_torch.environments.check import check_environment
-from sgimd_torch.environments.from_gymnasium import measured_noise
-from sgimd_torch.runs.tasks import benchmark_of
-from sgimd_torch.runs.tasks.taught import demonstrations_of
+from sgimd_torch.extras.check.promises import check_environment
+from sgimd_torch.extras.gymnasium.from_gymnasium import measured_noise
 from sgimd_torch.spaces import stream
+from sgimd_torch.tasks import benchmark_of
+from sgimd_torch.tasks.taught import demonstrations_of
 from swimmer import Swimmer, swimmer
 
 NO_CONTEXT = np.zeros(0)

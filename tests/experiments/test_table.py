@@ -6,7 +6,7 @@ import pytest
 
 from claims import main
 from made_up import row, write
-from sgimd_torch.runs.signals import command
+from sgimd_torch.runs.program import command
 from table import FILE, LEARNING, TABLES, ResultsError, merge, read_table, write_table
 
 SHIPPED = Path(__file__).parents[2] / "results"

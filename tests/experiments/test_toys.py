@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from sgimd_torch.environments.check import check_environment
-from sgimd_torch.runs.tasks import benchmark_of
+from sgimd_torch.extras.check.promises import check_environment
 from sgimd_torch.spaces import stream
+from sgimd_torch.tasks import benchmark_of
 from toys import (
     GRAVITY,
     BlindToss,

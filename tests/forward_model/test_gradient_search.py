@@ -12,7 +12,7 @@ from sgimd_torch.forward_model import search as module
 from sgimd_torch.forward_model.anchored import Anchored
 from sgimd_torch.forward_model.model import ForwardModel
 from sgimd_torch.forward_model.proved import ProvedModel
-from sgimd_torch.forward_model.search import GradientSearch, GradientThenNelderMead
+from sgimd_torch.forward_model.search import GradientSearch
 from sgimd_torch.forward_model.shared import model_of
 from sgimd_torch.inverses.locally_linear import LocallyLinear
 from sgimd_torch.inverses.nearest import NearestNeighbour
@@ -170,27 +170,11 @@ UNTRUSTED = {
 }
 
 
-def test_the_simplex_after_the_gradient_begins_at_its_answer_and_goes_on_from_there(few, model, inverse, goals):
-    estimate, goal = inverse(NO_CONTEXT, goals[0]), goals[0]
-    answer = next(GradientSearch(problem_of(few, model), noise=0.0)(estimate, goal))
-    assert not np.allclose(answer, estimate.theta, atol=0.01)
-    both = pursue(GradientThenNelderMead(problem_of(few, model), noise=0.0), estimate, goal)[0]
-    np.testing.assert_array_equal(both[0], answer)  # so the descent has cost no movement
-    simplex = pursue(NelderMead(problem_of(few), noise=0.0), estimate._replace(theta=answer), goal)[0]
-    np.testing.assert_array_equal(both, simplex)
-    varied = pursue(GradientThenNelderMead(problem_of(few, model), noise=0.1), estimate, goal, n=1)[0]
-    simplex = pursue(NelderMead(problem_of(few), noise=0.1), estimate._replace(theta=answer), goal, n=1)[0]
-    np.testing.assert_array_equal(varied, simplex)  # noise is added once
-
-
 @pytest.mark.parametrize("why", UNTRUSTED)
 def test_until_the_model_is_trusted_the_search_is_the_simplex_bit_for_bit(few, model, inverse, goals, why):
     estimate = inverse(NO_CONTEXT, goals[0])
-    search, both = (make(UNTRUSTED[why](few, model)) for make in (GradientSearch, GradientThenNelderMead))
-    simplex = NelderMead(problem_of(few))
-    thetas = [pursue(one, estimate, goals[0], n=6)[0] for one in (search, simplex, both)]
-    np.testing.assert_array_equal(*thetas[:2])
-    np.testing.assert_array_equal(*thetas[1:])
+    search, simplex = GradientSearch(UNTRUSTED[why](few, model)), NelderMead(problem_of(few))
+    np.testing.assert_array_equal(*(pursue(one, estimate, goals[0], n=6)[0] for one in (search, simplex)))
     if why == "not trained":  # a model that becomes good enough is used for the next goal
         search.model.load_state_dict(model.state_dict())
         trusted = GradientSearch(problem_of(few, model))
@@ -200,10 +184,9 @@ def test_until_the_model_is_trusted_the_search_is_the_simplex_bit_for_bit(few, m
         assert not np.isclose(thetas[0], pursue(simplex, estimate, goals[0], n=1)[0]).all()
 
 
-@pytest.mark.parametrize("make", [GradientSearch, GradientThenNelderMead])
-def test_a_seed_makes_the_same_movements_and_the_model_does_not_change(few, model, inverse, goals, make):
+def test_a_seed_makes_the_same_movements_and_the_model_does_not_change(few, model, inverse, goals):
     problems, random = [problem_of(few, model, seed=k) for k in (3, 3, 4)], torch.random.get_rng_state()
-    searches = [make(problem) for problem in problems]
+    searches = [GradientSearch(problem) for problem in problems]
     one, same, other = (pursue(search, inverse(NO_CONTEXT, goals[0]), goals[0], 4)[0] for search in searches)
     np.testing.assert_array_equal(one, same)
     assert not np.array_equal(one, other)

@@ -9,8 +9,8 @@ import signal
 import mujoco
 import numpy as np
 
-from sgimd_torch.environments.lerobot import LeRobotArm
-from sgimd_torch.options.signature import with_keywords_of
+from sgimd_torch.calls import with_keywords_of
+from sgimd_torch.extras.lerobot.arm import LeRobotArm
 
 
 class Clock:

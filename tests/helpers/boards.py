@@ -1,6 +1,12 @@
 """Helpers for tests of boards: they read the event file of a run with TensorBoard's own reader."""
 
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+from tensorboard.plugins.hparams.metadata import (
+    EXPERIMENT_TAG,
+    SESSION_START_INFO_TAG,
+    parse_experiment_plugin_data,
+    parse_session_start_info_plugin_data,
+)
 
 
 def board_of(directory):
@@ -25,3 +31,12 @@ def pictures_of(directory):
     return {
         tag: {image.step: image.encoded_image_string for image in board.Images(tag)} for tag in board.Tags()["images"]
     }
+
+
+def hparams_of(directory):
+    board = board_of(directory)
+    start = parse_session_start_info_plugin_data(board.SummaryMetadata(SESSION_START_INFO_TAG).plugin_data.content)
+    values = {name: value.string_value or value.number_value for name, value in start.hparams.items()}
+    about = parse_experiment_plugin_data(board.SummaryMetadata(EXPERIMENT_TAG).plugin_data.content)
+    assert {info.name for info in about.hparam_infos} == values.keys()
+    return values, [info.name.tag for info in about.metric_infos]

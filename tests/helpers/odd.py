@@ -12,7 +12,7 @@ import os, signal, time
 import numpy as np
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import Benchmark
-from sgimd_torch.runs.tasks import Task
+from sgimd_torch.tasks import Task
 
 def signal_to(pid, signum):  # and wait until the own signal comes, or the end
     heard, hears = os.pipe()
@@ -53,7 +53,8 @@ def make():
     return Task(Arm(), lambda: Benchmark("Arm", np.array([[0.5, 0.5], [-0.3, 0.2]]), 0.1))
 """
 ODD = ["--environment", "odd:make", "--algorithm", "random", "--movements", "40", "--evaluate-at", "[]"]
-SWEEP = "import sys; from sgimd_torch.runs import signals, sweep; sys.exit(signals.command(sweep.main))"
+SWEEP = "import sys; from sgimd_torch.runs import program; from sgimd_torch.extras.sweep import command"
+SWEEP += "; sys.exit(program.command(command.main))"
 
 
 def odd_place(place, *options):

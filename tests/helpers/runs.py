@@ -15,8 +15,8 @@ from sgimd_torch.runs.directory import RUN_FILE
 
 ROOT = Path(sgimd_torch.__file__).parents[1]
 MOVEMENTS = 90
-RUN = "import sys; from sgimd_torch.options import command_line; from sgimd_torch.runs import signals"
-LIVE = f"{RUN}; sys.exit(signals.command(command_line.main, sys.argv[1:]))"
+RUN = "import sys; from sgimd_torch.runs import command as command_line; from sgimd_torch.runs import program"
+LIVE = f"{RUN}; sys.exit(program.command(command_line.main, sys.argv[1:]))"
 # A run that stops its own process after {0} movements; every movement is written to the disk at once.
 STOPS = f"""
 import os, signal

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from sgimd_torch.algorithms.paper import imitation, observation, random_exploration, sagg_riac, sgim_d
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.protocol import Environment
+from sgimd_torch.goals.interest_map import InterestMap
 from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.learner import Learner
 from sgimd_torch.memory import Memory
@@ -194,3 +195,37 @@ TAUGHT = {"observation", "imitation", "sgim-d"}
 def make(name: str, arm: PlanarArm, seed: int = 0) -> Learner:
     """One of the paper's five learners."""
     return ALGORITHMS[name](arm, seed)
+
+
+class Perfect(Inverse):
+    """The exact inverse of an arm, and the contexts that it was asked about."""
+
+    def __init__(self, arm: PlanarArm) -> None:
+        super().__init__(problem(arm))
+        self.arm = arm
+        self.asked: list[list[float]] = []
+
+    def __call__(self, context: Array, goal: Array) -> Estimate:
+        self.asked.append(context.tolist())
+        theta = self.arm.solve(context, goal)
+        return Estimate(theta, theta[None], goal[None])
+
+
+class Sure(Perfect):
+    """It expects outcomes .3 beside the goal, with a standard deviation of .4 / sqrt(pi / 2)."""
+
+    def __call__(self, context: Array, goal: Array) -> Estimate:
+        return super().__call__(context, goal)._replace(expected=np.add(goal, [0.3, 0.0]), sd=0.4 / np.sqrt(np.pi / 2))
+
+
+PLANE = Box.cube(-1.0, 1.0, 2, names=("x", "y"), unit="m")
+
+
+def interest_map(n=400, space=PLANE, context=(), worst=-1.0):
+    """An interest map whose goals were missed by more where x is above 0."""
+    goals = InterestMap(problem(contexts=Box.cube(-1, 1, len(context)), outcomes=space))
+    rng = stream(0, "competence")
+    for _ in range(n):
+        goal = goals.sample(context)
+        goals.add(context, goal, worst * rng.random() if goal[0] > 0 else -0.1)
+    return goals

@@ -5,10 +5,11 @@ import pytest
 from threadpoolctl import threadpool_info
 
 from experiments.toys import Toy, toss, two_elbows
-from sgimd_torch.inverses.gaussian_process import Kernel, choose_kernel, fit_lengths, one_thread
+from sgimd_torch.inverses.gaussian_process import choose_kernel, fit_lengths, one_thread
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.inverses.locally_linear import LocallyLinear
 from sgimd_torch.inverses.nearest import NearestNeighbour
+from sgimd_torch.inverses.tuples import GaussianProcess, Kernel, Movements, Question
 from sgimd_torch.memory.compiled import compiled
 from sgimd_torch.parts import Inverse, Problem
 from sgimd_torch.spaces import Array, stream
@@ -47,14 +48,14 @@ def waves(n: int = 30) -> tuple[Array, Array]:
     return inputs, np.stack([np.sin(inputs.sum(axis=1)), np.cos(inputs[:, 0])], axis=1)
 
 
-def fitted(inputs: Array, outcomes: Array, kernel: Kernel) -> kernels.GaussianProcess:
-    process, _ = kernels.fitted_process(np.arange(len(inputs)), inputs, outcomes, np.array(kernel))
+def fitted(inputs: Array, outcomes: Array, kernel: Kernel) -> GaussianProcess:
+    process, _ = kernels.fitted_process(np.arange(len(inputs)), inputs, outcomes, kernel)
     return process
 
 
 def predicted(inputs: Array, outcomes: Array, kernel: Kernel, point: Array) -> tuple[Array, float]:
     near = np.arange(len(inputs))[None]
-    (outcome,), (variance,), *_ = kernels.predictions(inputs, outcomes, near, point[None], np.array(kernel))
+    (outcome,), (variance,), *_ = kernels.predictions(inputs, outcomes, near, point[None], kernel)
     return outcome, variance
 
 
@@ -76,7 +77,7 @@ def test_the_compiled_kernel_is_a_sum_of_two_matern_and_its_slope_the_derivative
     point, covariance, slope = np.array([1.3, 0.9]), np.empty(30), np.empty(30)
 
     def at(place: Array) -> Array:
-        kernels.covariances(np.ascontiguousarray(inputs.T), np.array(kernel), place, covariance, slope)
+        kernels.covariances(np.ascontiguousarray(inputs.T), kernel, place, covariance, slope)
         return covariance.copy()
 
     assert at(point) == pytest.approx(covariances(kernel, np.linalg.norm(inputs - point, axis=1)))
@@ -91,7 +92,8 @@ def test_steps_reach_the_goal_where_the_process_can_reach_it(kernel: Kernel) -> 
     inputs, outcomes = waves()
     process, point, goal = fitted(inputs, outcomes, kernel), np.array([1.3, 0.9]), np.array([0.5, -0.4])
     units, box = np.stack((np.zeros(2), np.ones(2))), np.stack((np.zeros(2), np.full(2, 3.0)))
-    _, theta = kernels.descend(process, point, np.zeros(0), goal, 1e-9, units, np.ones(2), box)
+    known = Movements(inputs, inputs, outcomes, units, np.ones(2), box)
+    _, theta = kernels.descend(process, point, Question(NO_CONTEXT, goal, np.zeros((1, 1), int), point), known, 1e-9)
     missed, reached = (np.linalg.norm(predicted(inputs, outcomes, kernel, at)[0] - goal) for at in (point, theta))
     assert reached < 0.1 * missed
 
@@ -225,7 +227,7 @@ def test_a_gross_error_is_explained_by_noise_and_predictions_hardly_change(rows:
     (inputs, outcomes), kernel = waves(60), Kernel(1.0, 1.0, 0.0, 1e-4)
     wrong = outcomes.copy()
     wrong[rows] += [2.0, -3.0]
-    process, precision = kernels.fitted_process(np.arange(60), inputs, wrong, np.array(kernel))
+    process, precision = kernels.fitted_process(np.arange(60), inputs, wrong, kernel)
     assert np.flatnonzero(process.noises > kernel.noise).tolist() == rows
     covariance = covariances(kernel, np.linalg.norm(inputs[:, None] - inputs, axis=2)) + np.diag(process.noises)
     deviations, inverse = (wrong - wrong.mean(axis=0)).T, np.linalg.inv(covariance)
@@ -246,7 +248,7 @@ def test_gross_errors_do_not_decide_lengths_and_kernel() -> None:
     inverse = LocalProcess(remembering(inputs, wrong))
     errors = [np.linalg.norm(inverse.predict(NO_CONTEXT, point) - y) for point, y in zip(points, expected, strict=True)]
     assert np.mean(errors) < 0.01
-    assert inverse.fitted().kernel[2] == 0  # no rough part
+    assert inverse.fitted().kernel.share == 0  # no rough part
 
 
 @pytest.mark.parametrize("far", [25.0, 50.0])

@@ -76,7 +76,7 @@ def test_all_demonstrations_at_the_start_are_imitated_at_once():
 def test_an_imitation_of_one_robot_goes_on_for_group_after_group():
     learner = make("sgim-d", ARM)
     list(run(learner, ARM, 0, movements=20, at_once=2))
-    learner.watch(SHOWN[0], place=1)
+    learner.watch(SHOWN[0], robot=1)
     origins = [[move.origin for move in asked(learner, 2)] for _ in range(12)]
     assert [pair[1] == "imitate" for pair in origins] == [True] * 10 + [False] * 2
     assert "imitate" not in [pair[0] for pair in origins]
@@ -91,7 +91,7 @@ def asked(learner, robots):
 
 def test_attempts_that_began_in_another_order_than_the_robots_are_replayed_in_theirs(tmp_path):
     learner, again = LEARNERS["practice"](), LEARNERS["practice"]()
-    learner.request(NO_CONTEXT, place=1)  # the attempt of robot 1 begins first
+    learner.request(NO_CONTEXT, robot=1)  # the attempt of robot 1 begins first
     asked(learner, 2)
     save_life(learner, tmp_path / "life.sqlite")
     load_life(again, tmp_path / "life.sqlite")
@@ -119,11 +119,11 @@ def test_an_attempt_whose_rest_has_failed_is_begun_again_in_a_replay(tmp_path):
 
 def test_a_robot_that_fails_ends_its_own_attempt_alone():
     learner = make("sgim-d", ARM)
-    for place in range(3):
-        learner.watch(SHOWN[place], place=place)
+    for robot in range(3):
+        learner.watch(SHOWN[robot], robot=robot)
     moves = learner.ask_many([NO_CONTEXT] * 3)
     learner.tell_many([[0.1, 0.1], Failure("lost"), [0.2, 0.2]])
-    assert [learner.context_at(place) is None for place in range(3)] == [False, True, False]
+    assert [learner.context_of(robot) is None for robot in range(3)] == [False, True, False]
     assert (len(learner.memory), learner.movements) == (2, 3)
     assert [str(event.kind) for event in learner.events()][-3:] == ["moved", "failed", "moved"]
     assert np.array_equal(list(learner.events())[-2].theta, moves[1].theta)

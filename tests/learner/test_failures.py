@@ -14,9 +14,9 @@ from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.protocol import Environment, SimulationError
 from sgimd_torch.evaluation import contexts_of_goals, evaluate
-from sgimd_torch.options.command_line import main
+from sgimd_torch.runs.command import main
+from sgimd_torch.runs.program import command
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.runs.signals import command
 from sgimd_torch.session import NoOutcomeError, live, run
 from sgimd_torch.spaces import Array, Episode, Failure, stream
 from worlds import ArmThat
@@ -166,7 +166,7 @@ from pathlib import Path
 import numpy as np
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import Benchmark
-from sgimd_torch.runs.tasks import Task
+from sgimd_torch.tasks import Task
 class Broken(PlanarArm):
     execute_many = None
     def execute(self, context, theta, rng):

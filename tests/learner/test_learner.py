@@ -242,7 +242,7 @@ def test_what_callers_hand_in_may_change_afterwards() -> None:
     for array in (context, outcome, shown):
         array[:] = 9.0
     assert pursuit.contexts == [np.array([0.1])]
-    assert robot.context_at(0).tolist() == [0.1]
+    assert robot.context_of(0).tolist() == [0.1]
     assert robot.memory.outcomes.tolist() == [[0.2, 0.3]]
     robot.watch(lesson)
     move = robot.ask([0.1])
@@ -252,7 +252,7 @@ def test_what_callers_hand_in_may_change_afterwards() -> None:
 def test_what_the_learner_hands_out_is_read_only() -> None:
     robot = learner(Pursuit(context_dim=1))
     move = robot.ask([0.1])
-    for array in (move.theta, robot.context_at(0)):
+    for array in (move.theta, robot.context_of(0)):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 9.0
 

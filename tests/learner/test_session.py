@@ -144,7 +144,7 @@ def test_a_lesson_whose_answer_was_given_up_is_offered_again_and_such_a_life_can
     learner, teacher = make("sgim-d", arm), teacher_of(other, 5)
     with pytest.raises(KeyboardInterrupt):
         list(run(learner, arm, 0, movements=40, teacher=teacher))
-    assert learner.lesson_waits_at(0)
+    assert learner.lesson_waits_for(0)
     learner.interrupt()
     rest = list(run(learner, arm, 0, movements=40, teacher=teacher))
     assert [e.index for e in rest if e.demonstration is not None] == [15, 20, 25, 30, 35]

@@ -13,8 +13,8 @@ import sgimd_torch
 PROGRAM = """
 import numpy as np
 from sgimd_torch.memory.neighbours import Neighbours
-from sgimd_torch.memory.table import Table
-side = Neighbours(Table(1, np.arange(5.0)[:, None]))
+from sgimd_torch.memory.growing import Growing
+side = Neighbours(Growing(1, np.arange(5.0)[:, None]))
 print(*side.nearest(np.array([[3.2]]), 2)[0])
 """
 LIFE = """
@@ -96,9 +96,7 @@ def test_a_damaged_cache_is_made_again_and_a_change_of_what_compiled_code_calls_
     (package / "memory" / "scan.py").write_text(CALLING)  # compiled in a moment
     assert started(package, CALL, **mine).communicate() == ("9.0\n", SAID)
     (path,) = (tmp_path / "mine").rglob("*.nbc")
-    content = bytearray(path.read_bytes())
-    content[len(content) // 2] ^= 1  # of the machine code: numba would not notice it
-    path.write_bytes(content)
+    path.write_bytes(path.read_bytes()[:100])
     assert started(package, CALL, **mine).communicate() == ("9.0\n", SAID)
     assert "No module named 'sgimd_torch.nothing'" in started(package, MISSING, **mine).communicate()[1]
     assert started(package, CALL, **mine).communicate() == ("9.0\n", "")  # an error of another kind removes nothing

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from sgimd_torch.competence import Competence
 from sgimd_torch.memory import Memory
+from sgimd_torch.memory.growing import Growing
 from sgimd_torch.memory.neighbours import EXACT_UP_TO, LISTED, Neighbours
-from sgimd_torch.memory.table import Table
 from sgimd_torch.spaces import Array, Box, stream
 from worlds import problem
 
@@ -57,7 +57,7 @@ TABLES = {  # what single precision could confuse
 def test_neighbours_are_those_of_sorted_distances_while_the_table_grows(kind, dim, steps, data):
     rng = stream(data.draw(st.integers(0, 99)), kind)
     rows = TABLES[kind](rng, sum(steps), dim)
-    side, n = Neighbours(Table(dim)), 0
+    side, n = Neighbours(Growing(dim)), 0
     for step in steps:
         side.keys.append(rows[n : n + step])
         n += step
@@ -77,13 +77,13 @@ def test_neighbours_are_those_of_sorted_distances_while_the_table_grows(kind, di
 @pytest.mark.parametrize("n", [20_000, EXACT_UP_TO])
 def test_many_rows_are_searched_exactly(n):
     rows = structured(n, 3)
-    side = Neighbours(Table(3, rows))
+    side = Neighbours(Growing(3, rows))
     for query in (rows[7], np.zeros(3), np.full(3, 0.5), np.full(3, 1e9)):
         assert side.nearest(query[None], 40)[0].tolist() == nearest(rows, query, 40)
 
 
 def test_rows_added_later_count_whatever_k_was_before():
-    rows, side = np.append(0, 1 / np.arange(1.0, 60.0))[:, None], Neighbours(Table(1))  # each is nearer to the first
+    rows, side = np.append(0, 1 / np.arange(1.0, 60.0))[:, None], Neighbours(Growing(1))  # each is nearer to the first
     for n in range(1, 61):
         side.keys.append(rows[n - 1 : n])
         for k in (1, 40, 5):
@@ -93,7 +93,7 @@ def test_rows_added_later_count_whatever_k_was_before():
 @pytest.fixture(scope="module")
 def many():
     """More rows than are searched exactly."""
-    return Neighbours(Table(10, structured(EXACT_UP_TO + 50_000, 10)))
+    return Neighbours(Growing(10, structured(EXACT_UP_TO + 50_000, 10)))
 
 
 def test_above_it_nearly_all_are_found_nearest_first_and_within_the_radius(many):
@@ -111,7 +111,7 @@ def test_above_it_nearly_all_are_found_nearest_first_and_within_the_radius(many)
 
 
 def test_above_it_results_depend_on_the_rows_alone_not_on_when_they_were_added(many):
-    rows, grown = many.keys.rows, Neighbours(Table(10))
+    rows, grown = many.keys.rows, Neighbours(Growing(10))
     for start in range(0, len(rows), 47_000):
         grown.keys.append(rows[start : start + 47_000])
         grown.nearest(rows[:2], 3)
@@ -122,8 +122,8 @@ def test_above_it_results_depend_on_the_rows_alone_not_on_when_they_were_added(m
 def test_threads_that_ask_at_once_get_what_one_gets():
     rows = structured(3000, 5)
     asked = [np.arange(start, start + 20) for start in range(0, 2000, 13)]
-    expected = [Neighbours(Table(5, rows)).around(some, LISTED).tolist() for some in asked[:3]]
-    side = Neighbours(Table(5, rows))
+    expected = [Neighbours(Growing(5, rows)).around(some, LISTED).tolist() for some in asked[:3]]
+    side = Neighbours(Growing(5, rows))
     with ThreadPoolExecutor(4) as pool:
         together = [near.tolist() for near in pool.map(lambda some: side.around(some, LISTED), asked)]
     assert together[:3] == expected

@@ -3,36 +3,34 @@
 import inspect
 import json
 import re
-import sys
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
-from typing import get_args, get_origin
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sgimd_torch.figures.names import colour, label
-from sgimd_torch.options import command_line
-from sgimd_torch.options.build import build
 from sgimd_torch.options.catalogue import WORDS, about, load_word
-from sgimd_torch.options.command_line import main, parse
 from sgimd_torch.options.config import RUN, Config, all_options, words
 from sgimd_torch.options.help import overview
+from sgimd_torch.options.parse import parse
+from sgimd_torch.runs import command as run_command
+from sgimd_torch.runs.build import build
+from sgimd_torch.runs.command import main
+from sgimd_torch.runs.program import command
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.runs.signals import command
-from sgimd_torch.runs.tasks.goals import MAX_GOALS, goals_all_over
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Box
+from sgimd_torch.tasks.goals import MAX_GOALS, goals_all_over
 
 ENTRIES = [(kind, word) for kind, words in WORDS.items() for word in words]
 TAUGHT = '''
 import numpy as np
 from sgimd_torch import Demonstration, UniformGoals
-from sgimd_torch.runs.tasks import Task
+from sgimd_torch.tasks import Task
 from sliders import Slider
 
 def taught():
@@ -61,13 +59,6 @@ def test_a_word_is_described_by_its_docstring_in_a_line(kind, word):
         assert callable(load_word(kind, word))
         own = inspect.getdoc(load_word(kind, word))
         assert said in own or isinstance(load_word(kind, word), partial)
-
-
-def test_algorithms_have_a_name_and_a_colour_and_unknown_ones_their_word():
-    assert label("sgim-d") == "SGIM-D"
-    assert label("mine:Own") == "mine:Own"
-    assert re.fullmatch("#[0-9a-f]{6}", colour("sgim-d"))
-    assert len({colour(word) for word in ("random", "sagg-riac", "observation", "imitation", "sgim-d")}) == 5
 
 
 def test_a_users_task_comes_with_its_teacher_and_without_goals(own, module, capsys):
@@ -103,25 +94,28 @@ def test_goals_all_over_a_space_are_at_most_500_and_inside():
 
 
 VALUES = {
-    int: st.integers(),
-    float: st.floats(allow_nan=False),
-    bool: st.booleans(),
-    str: st.from_regex(r"[a-z]+:[a-z]{5}", fullmatch=True),
-    Path: st.sampled_from((Path("a"), Path("/b/c.npz"))),
-    type(None): st.none(),
+    "a number": st.floats(allow_nan=False),
+    "a whole number": st.integers(),
+    "true or false": st.booleans(),
+    "text": st.from_regex(r"[a-z]+:[a-z]{5}", fullmatch=True),
+    "a path": st.sampled_from((Path("a"), Path("/b/c.npz"))),
+}
+SEVERAL = {
+    "numbers with commas": st.lists(VALUES["a number"], max_size=3),
+    "whole numbers with commas": st.lists(VALUES["a whole number"], max_size=3),
+    "names with commas": st.lists(VALUES["text"], max_size=3),
+    "two numbers with a comma between": st.lists(VALUES["a number"], min_size=2, max_size=2),
+    "three numbers with commas": st.lists(VALUES["a number"], min_size=3, max_size=3),
 }
 
 
-def values_of(kind):
+def values_of(option):
     """Strategy of the values of an option."""
-    if kind in WORDS:
-        return st.sampled_from(sorted(WORDS[kind]))
-    inner = get_args(kind)
-    if get_origin(kind) is tuple:
-        return (
-            st.lists(values_of(inner[0]), max_size=3).map(tuple) if ... in inner else st.tuples(*map(values_of, inner))
-        )
-    return st.one_of(map(values_of, inner)) if inner else VALUES[kind]
+    if option.part:
+        return st.sampled_from(sorted(WORDS[option.part]))
+    name = option.values.name.removesuffix(" or null")
+    values = VALUES[name] if name in VALUES else SEVERAL[name].map(tuple)
+    return st.none() | values if option.values.name.endswith("null") else values
 
 
 @st.composite
@@ -129,8 +123,8 @@ def configs(draw):
     """Any run: an algorithm, another part or none, and some values of options, step by step."""
     own = {
         "seed": st.integers(0),
-        "name": values_of(str | None),
-        "out": values_of(Path),
+        "name": values_of(RUN["name"]),
+        "out": values_of(RUN["out"]),
         "evaluate_at": st.just((5, 6)),
     }
     config = Config(draw(st.sampled_from(sorted(WORDS["algorithm"]))))
@@ -139,7 +133,7 @@ def configs(draw):
         options = all_options(config.chosen)
         name = draw(st.sampled_from(sorted(options.keys() - RUN.keys())))
         kept = {each: value for each, value in dict(config.parts).items() if not each.startswith(f"{name}.")}
-        config = replace(config, parts=kept | {name: draw(values_of(options[name].kind))})
+        config = replace(config, parts=kept | {name: draw(values_of(options[name]))})
     return config
 
 
@@ -176,7 +170,7 @@ def test_help_is_one_screen_and_a_parts_options_are_shown_once_it_is_chosen(caps
         with pytest.raises(SystemExit) as stop:
             parse(argv, "What it does.")
         assert stop.value.code == 0
-    assert len(overview(command_line.__doc__).splitlines()) <= 60
+    assert len(overview(run_command.__doc__).splitlines()) <= 60
     said = capsys.readouterr().out
     assert said.count("--goals.window ") == 2  # of which one is an example
     assert "number of recent competences" in " ".join(said.split())
@@ -206,13 +200,6 @@ def test_sagg_riac_with_every_part_of_practice_by_name_is_practice():
     for name in PARTS_OF_PRACTICE:
         fewer = {each: value for each, value in PARTS_OF_PRACTICE.items() if each != name}
         assert not np.array_equal(with_parts("sagg-riac", PUCK, **fewer), practice[PUCK]), name
-
-
-def test_an_entry_that_is_not_installed_names_its_extra(monkeypatch):
-    monkeypatch.setitem(sys.modules, "cma", None)
-    sys.modules.pop("sgimd_torch.rivals.cma_es", None)
-    with pytest.raises(ValueError, match=r"pip install 'sgimd-torch\[rivals\]'"):
-        load_word("search", "cma-es")
 
 
 def test_a_choice_that_switches_a_part_off_is_told():

@@ -8,10 +8,10 @@ import pytest
 
 import sgimd_torch
 from sgimd_torch import parts
+from sgimd_torch.calls import function_of
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.goals.uniform import UniformGoals
 from sgimd_torch.inverses.nearest import NearestNeighbour
-from sgimd_torch.options import function_of
 from sgimd_torch.options.catalogue import WORDS
 from sgimd_torch.parts import Goals
 from sgimd_torch.searches.simplex import NelderMead
@@ -28,8 +28,8 @@ KINDS = {
     "social": parts.Social,
 }
 LEARNING = (
-    *("parts", "strategies", "algorithms", "learner", "session", "goals", "inverses", "searches", "asking"),
-    *("rivals", "teachers", "forward_model", "competence", "evaluation", "options/build", "runs/run"),
+    *("parts", "strategies", "algorithms", "learner", "session", "goals", "inverses", "searches", "teachers"),
+    *("forward_model", "competence", "evaluation", "runs/build", "runs/run", "extras/asking", "extras/rivals"),
 )
 BY_NAME = {"getattr", "hasattr", "attrgetter"}
 FIELDS = {  # files and definitions that may look up members by name, because they handle all fields of a class; why
@@ -41,7 +41,8 @@ SIGNATURES = {"signature", "Signature", "getfullargspec", "parameters_of", "__co
 OPTIONS = {  # files and definitions that may read the parameters of a function; why
     ("options/signature", None): "the signature is the option",
     ("options/config", None): "options of the parts that a run has chosen",
-    ("options/built", "call_checked"): "refuses what a user's own function does not take",
+    ("calls", None): "reads them for options, and refuses what a user's own function does not take",
+    ("extras/changes/hook", "BeginWith"): "refuses an algorithm that does not learn from another robot",
 }
 
 
@@ -127,8 +128,7 @@ class Alien:
     ("make", "message"),
     [
         (Halfway, "Halfway has no add, which every Goals must have"),
-        ("uniform", "must be a class or a function, got 'uniform'; import UniformGoals"),
-        ("unifrom", "unknown goals 'unifrom'; did you mean uniform?"),
+        ("uniform", "must be a class or a function, got 'uniform'; import its class, names are for the command line"),
         (UniformGoals(problem()), "must be a class or a function, got a finished UniformGoals"),
         (Unasked, "Goals Unasked cannot be called with the arguments of its kind: too many positional arguments"),
         (NelderMead, "NelderMead must make a Goals, made a NelderMead; derive a class from Goals of sgimd_torch.parts"),

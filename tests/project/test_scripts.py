@@ -93,11 +93,13 @@ def test_setup_installs_what_is_missing_and_everything_serves_the_demo(setup):
     assert setup("") == ["venv", DEMO, ALL, ALL]
 
 
+@pytest.mark.slow
 def test_of_several_setups_at_once_one_installs_and_another_word_is_refused(setup):
     assert setup("demo", "demo", "demo") == ["venv", DEMO]
     assert setup("demos", wanted=2) == ["venv", DEMO]
 
 
+@pytest.mark.slow
 def test_an_installation_cut_short_starts_afresh_and_one_that_failed_goes_on(setup):
     assert setup("demo", wanted=3, PIP_FAILS="3") == ["venv", DEMO]
     assert setup("demo") == ["venv", DEMO, DEMO]

@@ -1,9 +1,12 @@
 """The import rules of the package: which rooms may import a room, and which rooms may import a library.
 
-A room is a folder of the package, or a file in no folder. A new file in a folder needs no change here.
+A room is a folder of the core, a file of the core in no folder, or a folder of ``extras``. The core imports no extra,
+not even inside functions; an extra imports the core and the extras that it declares. A new file in a folder, or a new
+extra, needs no change here.
 """
 
 import ast
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -11,68 +14,63 @@ from pathlib import Path
 import pytest
 
 import sgimd_torch
+from sgimd_torch import rooms
 
 PACKAGE = "sgimd_torch"
-ROWS = [  # a room imports only from rows above its own
-    {"spaces", "files", "options", "units"},
+ROWS = [  # a room of the core imports only from rows above its own
+    {"spaces", "files", "texts", "calls", "rooms"},
     {"memory", "environments"},
     {"parts", "demonstrations"},
-    {"competence", "teachers", "evaluation", "goals", "searches", "figures"},
-    {"inverses", "board"},
+    {"competence", "teachers", "evaluation", "goals", "searches"},
+    {"inverses"},
     {"strategies"},
     {"learner"},
-    {"changes"},
-    {"algorithms", "record"},
-    {"session", "asking", "rivals"},
+    {"algorithms", "record", "tasks"},
+    {"session"},
+    {"options"},
     {"runs"},
-    {"forward_model", "teach", "views"},
+    {"forward_model", "board"},
     {"__main__"},
 ]
 ROW = {room: row for row, rooms in enumerate(ROWS) for room in rooms}
-UPSTAIRS = dict.fromkeys(("options/build", "options/command_line"), "runs")  # files of another room than their folder
+EXTRAS = rooms.rooms()
 LIBRARIES = {  # rooms or single files that may import a library, by library
-    "numpy": ROW.keys(),
-    "scipy": ROW.keys() - {"spaces"},
+    "numpy": {*ROW, "extras"},
+    "scipy": {*ROW.keys() - {"spaces"}, "extras"},
     "lazy_loader": {"__init__"},
     "faiss": {"memory/neighbours"},
     "numba": {"memory/compiled", "memory/scan", "memory/jit", "inverses/kernels"},
-    "mujoco": {
-        "environments/rod_physics",
-        "environments/models",
-        "environments/mujoco_robot",
-        "views/film",
-        "teach",
-    },
-    "mujoco_menagerie": {"environments/models/file"},
+    "mujoco": {"environments/rod_physics", "extras/models", "extras/film", "extras/teach"},
+    "mujoco_menagerie": {"extras/models/file"},
     "torch": {"forward_model"},
     "lightning": {"forward_model"},
     "tensorboardX": {"board"},
-    "matplotlib": {"figures", "board/pictures", "views"},
-    "PIL": {"views/film"},
-    "imageio_ffmpeg": {"views/film"},
-    "viser": {"teach"},
-    "mink": {"teach"},
-    "trimesh": {"teach"},
-    "websockets": {"teach"},
-    "jinja2": {"views/report"},
+    "matplotlib": {"extras/pictures", "extras/report", "extras/paper", "extras/film", "extras/demo"},
+    "PIL": {"extras/film"},
+    "imageio_ffmpeg": {"extras/film"},
+    "viser": {"extras/teach"},
+    "mink": {"extras/teach"},
+    "trimesh": {"extras/teach"},
+    "websockets": {"extras/teach"},
+    "jinja2": {"extras/report"},
     "docstring_parser": {"options/signature"},
-    "tqdm": {"runs/signals", "views"},
-    "distributed": {"runs/cluster"},
+    "tqdm": {"runs/messages", "extras"},
+    "distributed": {"extras/sweep"},
     "threadpoolctl": {"inverses/gaussian_process"},
-    "cma": {"rivals"},
-    "sklearn": {"rivals"},
-    "ribs": {"rivals"},
-    "pyarrow": {"demonstrations/lerobot"},
-    "lerobot": {"environments/lerobot"},
-    "gymnasium": {"environments/from_gymnasium", "environments/to_gymnasium"},
+    "cma": {"extras/rivals"},
+    "sklearn": {"extras/rivals"},
+    "ribs": {"extras/rivals"},
+    "pyarrow": {"extras/recordings/lerobot"},
+    "lerobot": {"extras/lerobot"},
+    "gymnasium": {"extras/gymnasium"},
 }
 WORLDS = {"environments"}
 PROTOCOL = "environments.protocol"  # the part of ``environments`` that other rooms may import
 LEARNING = {
     *{"parts", "memory", "competence", "goals", "searches", "inverses", "strategies", "learner", "teachers"},
-    *{"asking", "changes", "rivals", "forward_model"},
+    "forward_model",
 }
-FREE = {"runs", "views", "teach", "__init__"}  # rooms that combine learning and environments
+FREE = {"runs", "tasks", "__init__"}  # rooms that combine learning and environments
 
 
 def imports(source: str):
@@ -86,8 +84,8 @@ def imports(source: str):
 
 
 def room_of(place: str) -> str:
-    """Room of a file, such as "goals" of "goals/regions"."""
-    return UPSTAIRS.get(place, place.partition("/")[0])
+    """Room of a file, such as "goals" of "goals/regions", or "extras/film" of "extras/film/reel"."""
+    return "/".join(place.split("/")[: 2 if place.startswith("extras/") else 1])
 
 
 def breach(place: str, name: str) -> str | None:
@@ -99,10 +97,15 @@ def breach(place: str, name: str) -> str | None:
         return (
             None if may or top in sys.stdlib_module_names else f"{place} imports {name}, allowed in {sorted(allowed)}"
         )
-    target = room_of("/".join(rest[:2])) if rest and rest[0] in ROW else "__init__"
+    target = room_of("/".join(rest)) if rest and rest[0] in {*ROW, "extras"} else "__init__"
     if target == "__init__":
         return None if rest[:1] == ["__version__"] or not rest else f"{place} imports {name} from the package"
-    if target != room and ROW[target] >= ROW[room]:
+    if target.startswith("extras"):
+        allowed = {room, *(f"extras/{need}" for need in getattr(EXTRAS.get(room.partition("/")[2]), "NEEDS", ()))}
+        return None if room.startswith("extras/") and target in allowed else f"{place} imports the room {target}"
+    if room.startswith("extras/"):
+        return None
+    if target != room and ROW[target] >= ROW.get(room, len(ROWS)):
         return f"{place} (row {ROW[room]}) imports {name} (row {ROW[target]})"
     if (room in LEARNING and target in WORLDS and not name.startswith(f"{PACKAGE}.{PROTOCOL}")) or (
         room in WORLDS and target in LEARNING
@@ -118,7 +121,12 @@ def breaches(package: Path) -> list[str]:
     for path in sorted(package.rglob("*.py")):
         place = path.relative_to(package).with_suffix("").as_posix()
         room = room_of(place)
-        if room not in ROW and place != "__init__":
+        if (
+            room not in ROW
+            and place != "__init__"
+            and room.partition("/")[2] not in EXTRAS
+            and room != "extras/__init__"
+        ):
             messages.append(f"{place} has no row yet: give it one in {Path(__file__).name}")
             continue
         messages += filter(None, (breach(place, name) for name in imports(path.read_text(encoding="utf-8"))))
@@ -135,7 +143,9 @@ def arrows(package: Path) -> dict[str, set[str]]:
     graph = {}
     for name, path in files.items():
         wanted = set()
-        for dotted in imports(path.read_text(encoding="utf-8")):
+        for dotted in imports(
+            re.sub(r"^if TYPE_CHECKING:.*\n(    .*\n)+", "", path.read_text(encoding="utf-8"), flags=re.M)
+        ):
             while dotted and dotted not in names:
                 dotted = dotted.rpartition(".")[0]
             wanted |= {names[dotted]} if dotted else set()
@@ -167,6 +177,19 @@ def test_every_file_keeps_to_its_row_and_its_libraries():
     assert breaches(Path(sgimd_torch.__path__[0])) == []
 
 
+def test_the_core_names_no_extra():
+    core = [path for path in Path(sgimd_torch.__path__[0]).rglob("*.py") if "extras" not in path.parts]
+    naming = re.compile("|".join(rf"extras[./]{room}\\b" for room in EXTRAS))
+    assert [path.name for path in core if naming.search(path.read_text(encoding="utf-8"))] == []
+
+
+def test_every_declared_extra_is_needed():
+    folder = Path(sgimd_torch.__path__[0]) / "extras"
+    for room, module in EXTRAS.items():
+        text = "".join(path.read_text(encoding="utf-8") for path in (folder / room).rglob("*.py"))
+        assert [need for need in getattr(module, "NEEDS", ()) if f"{PACKAGE}.extras.{need}" not in text] == [], room
+
+
 def test_no_files_import_each_other_in_a_circle():
     assert circle(arrows(Path(sgimd_torch.__path__[0]))) == []
 
@@ -178,8 +201,8 @@ def test_a_circle_is_found():
 
 def test_there_are_few_rooms_and_no_folder_is_crowded():
     package = Path(sgimd_torch.__path__[0])
-    rooms = {path for path in package.iterdir() if path.is_dir() and list(path.glob("*.py"))} | {*package.glob("*.py")}
-    assert len(rooms - {package / "__init__.py", package / "__main__.py"}) <= 28
+    folders = {path for path in package.iterdir() if path.is_dir() and list(path.glob("*.py"))}
+    assert len(folders | {*package.glob("*.py")}) <= 28
     for folder in [path for path in package.rglob("*") if path.is_dir()] + [package]:
         assert len(list(folder.glob("*.py"))) <= 16, folder
 
@@ -196,7 +219,9 @@ FORBIDDEN = [
     ("spaces", "import scipy.optimize"),
     ("board/listener", "from torch.utils.tensorboard import SummaryWriter"),
     ("session", "from experiments import variants"),
-    ("runs/run", "from sgimd_torch.views.table import main"),
+    ("runs/run", "from sgimd_torch.extras.table.command import main"),
+    ("runs/run", "def late():\n    from sgimd_torch.extras.table.command import main"),
+    ("extras/table/command", "from sgimd_torch.extras.film.reel import Shot"),  # not declared
     ("utils", "import math"),  # not in the table
 ]
 ALLOWED = [
@@ -204,16 +229,17 @@ ALLOWED = [
     ("goals/interest_map", "from sgimd_torch.goals.regions import Region"),  # in one room
     ("session", "from sgimd_torch.environments.protocol import Environment"),
     ("environments/rod_physics", "import mujoco\nfrom sgimd_torch.spaces import Array"),
-    ("runs/tasks", "from sgimd_torch.environments.fishing_rod import FishingRod"),
+    ("tasks/rod", "from sgimd_torch.environments.fishing_rod import FishingRod"),
+    ("extras/demo/command", "import numpy\nfrom sgimd_torch.extras.table.results import print_table"),
     ("runs/run", "from sgimd_torch import __version__"),
-    ("views/demo", "import matplotlib"),
+    ("extras/demo/command", "import matplotlib"),
 ]
 
 
 @pytest.mark.parametrize(("place", "statement"), FORBIDDEN + ALLOWED)
 def test_forbidden_imports_are_reported_and_allowed_ones_are_not(tmp_path, place, statement):
     path = (tmp_path / place).with_suffix(".py")
-    path.parent.mkdir(exist_ok=True)
+    path.parent.mkdir(exist_ok=True, parents=True)
     path.write_text(statement)
     assert len(breaches(tmp_path)) == ((place, statement) in FORBIDDEN)
 

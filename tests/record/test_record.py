@@ -26,11 +26,11 @@ def vectors(dim):
 def events(draw):
     """Events of every kind, with and without each of their fields, and with texts of numpy."""
     kind, (c, p, t) = draw(st.sampled_from(KINDS)), DIMS
-    in_context = kind not in (Kind.SHOWN, Kind.CHANGED)
+    in_context = kind not in (Kind.SHOWN, Kind.CHANGED, Kind.RESTARTED)
     numbers = (draw(vectors(c) if in_context else st.none()), *(draw(vectors(dim)) for dim in (p, t, t)))
     texts = [draw(st.none() | st.sampled_from(["local", "", "a\nb\0"]) | st.just(np.str_("own"))) for _ in range(4)]
     lesson = draw(DEMONSTRATIONS) if kind == Kind.SHOWN else None
-    return Event(kind, *numbers, texts[0], lesson, *texts[1:], place=draw(st.integers(-1, 9)))
+    return Event(kind, *numbers, texts[0], lesson, *texts[1:], robot=draw(st.integers(-1, 9)))
 
 
 def same(one, other):

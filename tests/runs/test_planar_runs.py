@@ -10,12 +10,12 @@ from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import Benchmark, save_benchmark
 from sgimd_torch.options.catalogue import WORDS
-from sgimd_torch.options.command_line import main
+from sgimd_torch.runs.command import main
 from sgimd_torch.runs.directory import RUN_FILE
+from sgimd_torch.runs.program import command
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.runs.signals import command
-from sgimd_torch.runs.tasks.robots import arm_benchmark, arm_demonstrations
 from sgimd_torch.spaces import stream
+from sgimd_torch.tasks.robots import arm_benchmark, arm_demonstrations
 
 NO_CONTEXT = np.empty(0)
 ALGORITHMS = WORDS["algorithm"]

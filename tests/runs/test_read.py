@@ -9,7 +9,8 @@ from runs import edit, write_about
 from sgimd_torch.algorithms.paper import random_exploration
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.learner.events import Event, Kind
-from sgimd_torch.options.command_line import parse
+from sgimd_torch.options.config import Config
+from sgimd_torch.options.parse import parse
 from sgimd_torch.record import DERIVED, Record, RunError
 from sgimd_torch.record.replay import save_life
 from sgimd_torch.runs.directory import RUN_FILE
@@ -34,11 +35,11 @@ def test_the_arrays_of_a_run_are_the_rows_of_its_record(reference, undisturbed):
     run = read_run(undisturbed)
     moved = [row for row in reference["events"] if row[1] == Kind.MOVED]
     found = np.hstack((run.contexts, run.thetas, run.goals, run.outcomes))
-    np.testing.assert_array_equal(found, np.array([row[3:-5] for row in moved], dtype=np.float64))
+    np.testing.assert_array_equal(found, np.array([row[3:-6] for row in moved], dtype=np.float64))
     assert run.origin.tolist() == [row[2] for row in moved]
     assert run.index.tolist() == list(range(90))
     before = [reference["events"][k - 1] for k, row in enumerate(reference["events"]) if row[1] == Kind.MOVED]
-    shown = [row[-5] if row[1] == Kind.SHOWN else -1 for row in before]
+    shown = [row[-6] if row[1] == Kind.SHOWN else -1 for row in before]
     assert run.demonstration.tolist() == shown
     assert run.benchmark.tolist() == [[0.0, 0.6], [0.3, 0.5], [-0.4, 0.4]]
     assert {name: len(column) for name, column in run.errors.items() if name != "context"} == dict.fromkeys(
@@ -60,7 +61,7 @@ def test_whether_a_run_is_finished_is_counted_not_believed(run):
     config = config_on(run)
     assert read_run(run).summary["finished"] is True
     assert finished(config)
-    assert finished(replace(config, board=True))
+    assert finished(Config.from_settings({**config.settings, "board": True}))
     changes = {"movements": 9, "seed": 4, "evaluate_at": (6,), "floor_at": (), "repeats": 2}
     for name, value in changes.items():
         assert not finished(replace(config, **{name: value})), name
@@ -122,25 +123,25 @@ def test_runs_are_found_by_name_and_seed(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "place",
+    "reference",
     [
-        "sgimd_torch.views.statistics:optimize._trustregion.scipy.signal._signaltools.timeit.timeit",
+        "sgimd_torch.inverses.gaussian_process:optimize._trustregion.scipy.signal._signaltools.timeit.timeit",
         "sgimd_torch.files:os.getcwd",
         "sgimd_torch.__main__:main",
-        "sgimd_torch.runs.tasks.robots:PlanarArm.__init__",
+        "sgimd_torch.tasks.robots:PlanarArm.__init__",
     ],
 )
-def test_a_record_executes_no_code_without_trust_though_its_place_is_in_this_library(run, place):
+def test_a_record_executes_no_code_without_trust_though_its_reference_is_in_this_library(run, reference):
     found = read_run(run)
     for name in ("environment", "algorithm"):
         with pytest.raises(RunError, match="names code outside this library"):
-            config_of(replace(found, config={**found.config, name: place}))
+            config_of(replace(found, config={**found.config, name: reference}))
 
 
-def test_a_place_of_the_catalogue_needs_no_trust(run):
+def test_a_reference_of_the_catalogue_needs_no_trust(run):
     found = read_run(run)
-    place = "sgimd_torch.runs.tasks.robots:planar_arm_7"
-    assert config_of(replace(found, config={**found.config, "environment": place}))["environment"] == place
+    reference = "sgimd_torch.tasks.robots:planar_arm_7"
+    assert config_of(replace(found, config={**found.config, "environment": reference}))["environment"] == reference
 
 
 def test_a_request_has_the_demonstration_that_follows_it_and_no_later_one(run):

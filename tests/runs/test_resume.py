@@ -25,32 +25,30 @@ from runs import (
 )
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.inverses.locally_linear import LocallyLinear
-from sgimd_torch.options import build
-from sgimd_torch.options.command_line import main
 from sgimd_torch.record import Record
-from sgimd_torch.runs import evaluations
+from sgimd_torch.runs import build, evaluations
 from sgimd_torch.runs import run as run_module
+from sgimd_torch.runs.command import main
 from sgimd_torch.runs.directory import RUN_FILE
+from sgimd_torch.runs.program import command
 from sgimd_torch.runs.read import movements_on_disk, read_run
-from sgimd_torch.runs.signals import command
-from sgimd_torch.runs.tasks import benchmark_of
 from sgimd_torch.spaces import stream
+from sgimd_torch.tasks import benchmark_of
 
-# On the arm: a learner with regions, one that asks, one with a model; and one in contexts.
+# On the arm: a learner with regions, one with a model; and one in contexts.
 ARM = "--environment planar-arm-7 --benchmark null --repeats 0 --evaluate_at 50"
 LEARNERS = {
     "rod": "",
     "rod, observing": "--algorithm observation",
     "arm": f"{ARM} --algorithm sagg-riac",
-    "asking": f"{ARM} --algorithm sgim-acts --teachers low-half,high-half",
     "model": f"{ARM} --search gradient --inverse model --inverse.rate 0.5 --inverse.members 2 --evaluated-by own",
-    "contexts": f"{ARM} --environment experiments.toys:toss --algorithm sgim-im --teachers all",
+    "contexts": f"{ARM} --environment experiments.toys:toss --algorithm practice-taught",
 }
 
 
 @pytest.mark.parametrize(
     ("name", "movements", "signum", "code"),
-    [("rod", 64, signal.SIGKILL, -9), ("rod", 40, signal.SIGINT, 130), ("asking", 33, signal.SIGKILL, -9)],
+    [("rod", 64, signal.SIGKILL, -9), ("rod", 40, signal.SIGINT, 130), ("contexts", 33, signal.SIGKILL, -9)],
 )
 def test_a_run_that_is_stopped_and_resumed_ends_as_if_it_never_was(
     tmp_path, go, benchmark, capsys, name, movements, signum, code
@@ -242,7 +240,7 @@ def test_another_configuration_a_shorter_one_and_what_is_no_run_are_refused(tmp_
     assert files_of(copy) == before
 
 
-@pytest.mark.parametrize("watched", ["false", "true"])
+@pytest.mark.parametrize("watched", ["false", pytest.param("true", marks=pytest.mark.slow)])
 def test_a_full_disk_is_reported_and_the_run_can_go_on(tmp_path, go, benchmark, reference, watched):
     words = (*arguments(tmp_path, benchmark), "--board", watched)
     process = start(STOPS.format(-1), *words, limit="-f 64")  # KiB a file may have

@@ -3,7 +3,6 @@
 import os
 import re
 import shlex
-import signal
 import subprocess
 import sys
 
@@ -12,12 +11,13 @@ import pytest
 
 from runs import ROOT, content_of
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
-from sgimd_torch.options.build import build
-from sgimd_torch.options.catalogue import WORDS
 from sgimd_torch.runs import evaluations
+from sgimd_torch.runs.build import build
+from sgimd_torch.runs.messages import ProgressBar
 from sgimd_torch.runs.read import config_of, read_run
-from sgimd_torch.runs.signals import Progress
 from sgimd_torch.spaces import Demonstration
+
+SCRIPTS = {**os.environ, "PYTHONPATH": str(ROOT)}
 
 
 @pytest.mark.parametrize("threads", [1, 2])
@@ -40,30 +40,6 @@ def test_a_run_has_the_answers_that_were_asked_for_and_its_movements_do_not_depe
     parts = build(config_of(run))
     assert parts.inverses["process"] is parts.inverses["own"] is parts.learner.inverse
     assert parts.inverses["nearest"] is not parts.inverses["own"]
-
-
-@pytest.mark.parametrize(
-    ("kind", "table"),
-    [item for item in WORDS.items() if item[0] not in ("algorithm", "environment", "command", "network")],
-)
-def test_every_choice_runs_and_differs_from_the_others(tmp_path, go, kind, table):
-    logs = set()
-    option = {"progress": "goals.progress", "choose": "teacher.choose"}.get(kind, kind)
-    # Short attempts and a short window, so that the map is split, and has its say, before the run is over.
-    common = ["--evaluate_at", "[]", "--environment", "planar-arm-7", "--benchmark", "null"]
-    common += ["--movements", 240 if kind in ("goals", "progress") else 120]
-    common += ["--algorithm", "sgim-im"] if kind == "teachers" else ["--budget", 3]
-    common += ["--teacher.every", 20] if kind == "choose" else []
-    common += ["--goals.window", 4] if kind == "progress" else []
-    common += ["--environment", "fishing-rod"] if kind in ("teachers", "judge") else []
-    # Models have test_run_model.py; a person who is not there is like no teacher, and demonstrator 3 is all there are.
-    left_out = "gradient", "gradient-then-nelder-mead", "model", "model-alone", "by-hand", "demonstrator-3"
-    choices = [choice for choice in table if choice not in left_out]
-    for choice in choices:
-        assert go(tmp_path, "--name", choice, f"--{option}", choice, *common) == 0
-        logs.add(tuple(content_of(tmp_path / choice / "seed-003")["events"]))
-    # On an arm, where every movement has an effect, this is `process`.
-    assert len(logs) == len(choices) - ("among-effects" in choices)
 
 
 @pytest.mark.parametrize("slip", ["three samples", "degrees", "milliseconds", "a few milliseconds"])
@@ -103,55 +79,7 @@ def test_an_error_of_a_part_keeps_its_traceback_and_says_how_to_go_on(tmp_path, 
     assert "Traceback (most recent call last):" in errors
 
 
-POOL = """
-import multiprocessing, os, signal, time
-from sgimd_torch.runs.signals import Stopping
-with Stopping():
-    pool = multiprocessing.get_context("fork").Pool(2)
-    pool.map(abs, range(4))
-    for worker in pool._pool:
-        os.kill(worker.pid, signal.SIGINT)  # as Ctrl-C, which reaches the whole group
-    print(pool.map(abs, range(4)))
-    pool.terminate()
-    pool.join()
-    for _ in range(20):
-        with multiprocessing.get_context("fork").Pool(2):
-            pass  # its workers are ended while they begin
-"""
-
-
-def test_workers_that_an_environment_forks_can_be_ended_and_leave_ctrl_c_to_the_run():
-    done = subprocess.run([sys.executable, "-c", POOL], env=SCRIPTS, capture_output=True, text=True, timeout=60)
-    assert (done.stdout, done.stderr, done.returncode) == ("[0, 1, 2, 3]\n", "", 0)
-
-
-SCRIPTS = {**os.environ, "PYTHONPATH": str(ROOT)}
-
-
-@pytest.mark.parametrize(
-    "script",
-    [
-        *(f"-m sgimd_torch {words}" for words in ("run --out", "demo --out", "table", "report")),
-        *(f"experiments/{name}.py" for name in ("compare", "claims", "figures")),
-    ],
-)
-def test_ctrl_c_while_python_imports_shows_no_traceback(script, tmp_path):
-    command = [sys.executable, "-X", "importtime", *script.split(), str(tmp_path)]
-    said = ""
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=SCRIPTS, cwd=ROOT) as process:
-        for line in process.stderr:  # importtime tells what is loaded, as it goes
-            said += line
-            if " numpy." in line:
-                process.send_signal(signal.SIGINT)
-                break
-        said += process.stderr.read()
-    assert process.returncode == 130
-    assert "Traceback" not in said
-
-
-@pytest.mark.parametrize(
-    ("redirection", "code"), [("| true", 0), (">/dev/full", 1), ("2>/dev/full", 0), ("2>&-", 0), (">&-", 0), ("", 0)]
-)
+@pytest.mark.parametrize(("redirection", "code"), [("| true", 0), (">/dev/full", 1), ("2>&-", 0), (">&-", 0)])
 def test_a_run_finishes_whatever_happens_to_its_output(tmp_path, redirection, code):
     script = [sys.executable, "-m", "sgimd_torch", "run", "--environment", "planar-arm-7", "--out", str(tmp_path)]
     command = shlex.join([*script, "--algorithm", "random", "--movements", "5", "--repeats", "0", "--name", "Å"])
@@ -179,8 +107,8 @@ def test_small_matrices_get_one_thread_unless_the_user_chose(chosen, threads):
 
 def test_the_time_that_is_left_counts_evaluations(monkeypatch, capsys):
     clock = [0.0]
-    monkeypatch.setattr("sgimd_torch.runs.signals.time.monotonic", lambda: clock[0])
-    with Progress("run", 100) as progress:
+    monkeypatch.setattr("sgimd_torch.runs.messages.time.monotonic", lambda: clock[0])
+    with ProgressBar("run", 100) as progress:
         clock[0] = 60.0  # 50 movements in 50 s, and evaluations of 10 s
         progress.show(50)
     assert "50 of 100 movements, 0.833/s, 01:00 left" in capsys.readouterr().err

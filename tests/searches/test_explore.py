@@ -135,28 +135,28 @@ def test_without_a_plateau_answers_and_exploration_are_the_usual_ones():
     goal = np.array([0.3, 0.4])
     assert np.array_equal(ours.inverse(NO_CONTEXT, goal).theta, usual.inverse(NO_CONTEXT, goal).theta)
     explore, plain = Returning(ours), Returning(usual)
-    assert explore.share == 0.1  # 20 of the 200 movements so far
+    assert explore.share() == 0.1  # 20 of the 200 movements so far
     assert all(np.array_equal(explore(NO_CONTEXT), plain(NO_CONTEXT)) for _ in range(20))
 
 
 def test_returning_is_uniform_until_a_movement_has_an_effect_and_then_half_around_this_movement():
     memory = presses(50, pressed=0.0)
     explore = returning(memory)
-    assert explore.share == 1.0
+    assert explore.share() == 1.0
     anywhere = np.array([explore(np.zeros(1)) for _ in range(200)])
     assert anywhere.std(axis=0) == pytest.approx(np.full(3, np.sqrt(1 / 12)), rel=0.15)
     memory.add(np.zeros(1), np.array([0.1, 0.9, 0.5]), np.array([2.0]))
     around = np.array([explore(np.zeros(1)) for _ in range(200)])
     assert (np.abs(around - [0.1, 0.9, 0.5]).max(axis=1) < 0.25).mean() == pytest.approx(0.5, abs=0.15)
     presses(200, memory=memory)
-    assert explore.share == 2 * 20 / 251  # enough effects to learn from
+    assert explore.share() == 2 * 20 / 251  # enough effects to learn from
 
 
 def test_after_the_first_movements_global_ones_are_uniform_and_ever_less_frequent():
     memory, rng = Memory(0, 2, 1), np.random.default_rng(0)
     explore, shares = Returning(problem(policies=POLICIES, memory=memory, inverse=AmongEffects)), {}
     for n in range(1001):
-        shares[n] = explore.share
+        shares[n] = explore.share()
         theta = POLICIES.sample(rng)
         memory.add([], theta, theta[:1])
     assert [shares[n] for n in (0, 19, 20, 100, 200, 400, 1000)] == [1.0, 1.0, 0.2, 0.2, 0.1, 0.05, 0.05]

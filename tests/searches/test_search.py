@@ -44,7 +44,7 @@ def test_the_simplex_visits_the_same_points_as_scipy(
         options={"initial_simplex": simplex, "maxfev": 2000, "maxiter": np.inf},
     )
     values = np.array([function(x) for x in simplex])
-    descent = simplex_descent(simplex, values, place=box.clip if box else None)
+    descent = simplex_descent(simplex, values, allow=box.clip if box else None)
     ours = drive(descent, function, 2000 - len(simplex))
     assert np.array_equal(np.array(ours), np.array(visited[dim + 1 :]))
     assert len(ours) > 20
@@ -238,7 +238,7 @@ def noise_of(world: World, noise: float, seed: int, n: int) -> Array:
 
     vertices = np.vstack((executed[0], world.thetas))
     values = np.array([world.distance(vertex) for vertex in vertices])
-    descent = simplex_descent(vertices, values, place=place, xatol=1e-4, fatol=1e-4)
+    descent = simplex_descent(vertices, values, allow=place, xatol=1e-4, fatol=1e-4)
     replayed = drive(descent, world.distance, n - 2)  # the next is placed, too
     assert np.array_equal(replayed, executed[1 : n - 1])
     return np.array(differences)

@@ -28,13 +28,12 @@ import numpy as np
 
 from sgimd_torch.environments.motor_primitives import GaussianPrimitive
 from sgimd_torch.environments.protocol import execute_many, primitive_of
-from sgimd_torch.files import check_writable, write_text
-from sgimd_torch.options.build import RunParts
-from sgimd_torch.options.signature import parsed
+from sgimd_torch.files import check_writable, read_csv, write_text
 from sgimd_torch.runs.load import OpenRun
-from sgimd_torch.runs.past import read_csv
-from sgimd_torch.runs.signals import Failed, parser_of
+from sgimd_torch.runs.program import Failed, parser_of
+from sgimd_torch.runs.run_parts import RunParts
 from sgimd_torch.spaces import Array, Box, Failure, stream
+from sgimd_torch.texts import NUMBER
 
 Answer = dict[str, Array]
 """Vectors of an answer, by the names "goal", "context", "theta", "expected" and "reached", and ``DISTANCES``, of one
@@ -58,7 +57,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     goals = [*options.goal, *(_read(options.goals, parts.environment.outcomes) if options.goals else [])]
     if not goals or (options.trajectory and len(goals) > 1):
         raise ValueError("give --goal X,Y or --goals FILE; --trajectory takes one goal")
-    run.replay()
+    run.recall()
     answers = list(_answers(parts, goals, options.context))
     failed = list(_execute(parts, answers)) if options.execute else []
     if options.trajectory:
@@ -93,9 +92,8 @@ def parser() -> argparse.ArgumentParser:
 
 def _answers(parts: RunParts, goals: Sequence[Sequence[float]], given: Sequence[float] | None) -> Iterator[Answer]:
     robot, inverse = parts.environment, parts.learner.inverse
-    if given is None and parts.config.context:
-        names = ", ".join(robot.contexts.names)
-        raise ValueError(f"--context must be given, as the run has --context previous; it is: {names}")
+    if given is None and (why := getattr(robot, "asks_context", "")):
+        raise ValueError(f"--context must be given: {why}; it is {', '.join(robot.contexts.names)}")
     middle = (robot.contexts.low + robot.contexts.high) / 2
     context = robot.contexts.check("--context", middle if given is None else given)
     if not len(parts.learner.memory):
@@ -132,7 +130,7 @@ def _read(path: Path, box: Box) -> list[list[float]]:
     goals = list[list[float]]()
     for number, row in read_csv(path):
         try:
-            goals.append([parsed(cell, float) for cell in row])
+            goals.append([NUMBER.of(cell) for cell in row])
         except ValueError as error:
             if number > 1 or not all(cell.strip()[:1].isalpha() for cell in row):
                 what = ",".join(row)[:60]

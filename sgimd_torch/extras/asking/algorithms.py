@@ -12,14 +12,14 @@ from typing import Any, Final
 
 from sgimd_torch.algorithms import MakeInverse
 from sgimd_torch.algorithms.practice import PRACTICE
-from sgimd_torch.asking.interest import AUTONOMOUS, StrategicInterest
-from sgimd_torch.asking.strategy import Asking, StrategicBabbling
+from sgimd_torch.calls import with_keywords_of
 from sgimd_torch.competence import AttemptCompetence
 from sgimd_torch.environments.protocol import Environment
+from sgimd_torch.extras.asking.interest import AUTONOMOUS, StrategicInterest
+from sgimd_torch.extras.asking.strategy import Asking, StrategicBabbling
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Correspondence, Learner
 from sgimd_torch.memory import Memory
-from sgimd_torch.options.signature import with_keywords_of
 from sgimd_torch.parts import Demonstrator, Problem
 from sgimd_torch.searches.explore import Anywhere
 from sgimd_torch.searches.simplex import NelderMead

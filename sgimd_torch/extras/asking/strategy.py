@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sgimd_torch.asking.interest import AUTONOMOUS, StrategicGoals
+from sgimd_torch.extras.asking.interest import AUTONOMOUS, StrategicGoals
 from sgimd_torch.parts import Part, Social, Strategy
 from sgimd_torch.spaces import Array, AskingAttempt, Request
 from sgimd_torch.strategies import GoalBabbling, recording_outcomes

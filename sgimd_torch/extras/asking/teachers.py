@@ -1,7 +1,7 @@
 """Teachers who are asked for a demonstration of a goal; they reply with their nearest demonstration, or not at all.
 
 Nguyen & Oudeyer (2012), "Active choice of teachers, learning strategies and goals for a socially guided intrinsic
-motivation learner". A learner of `sgimd_torch.asking` asks; `run` hands its requests to the teachers.
+motivation learner". A learner of `sgimd_torch.extras.asking` asks; `run` hands its requests to the teachers.
     teachers = {"left": AnsweringTeacher(demonstrations, stream(seed, "left"), knows=low_half)}
     teachers["left"].demonstrate(context, goal, memory)
 """

@@ -14,24 +14,13 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Any, Final
 
-from sgimd_torch.environments.protocol import Environment, SimulationError, reason_of
-from sgimd_torch.runs.tasks import Task
+from sgimd_torch.environments.protocol import SimulationError, reason_of
 from sgimd_torch.session import Execute, live
 from sgimd_torch.spaces import Array, Failure
+from sgimd_torch.tasks import Task
 
 ONE: Final = "is one robot all there is?"
 _robot: Execute  # executes movements in this process, if it is one of several
-
-
-def check_at_once(environment: Environment, at_once: int) -> None:
-    """Refuse more movements at once than the robot can make.
-
-    Raises:
-        ValueError: the environment has a lower limit.
-    """
-    most = getattr(environment, "at_once", at_once)  # of the driver of a single robot, for example
-    if at_once > most:
-        raise ValueError(f"at_once must be at most {most}, the at_once of {type(environment).__name__}, got {at_once}")
 
 
 @contextmanager

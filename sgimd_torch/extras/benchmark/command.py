@@ -25,8 +25,9 @@ from pathlib import Path
 import numpy as np
 
 from sgimd_torch.evaluation import TILES, Benchmark, save_benchmark, tile_goals, tile_side, tile_sides
+from sgimd_torch.runs.messages import say
+from sgimd_torch.runs.program import parser_of
 from sgimd_torch.runs.read import Run, find_runs, read_run
-from sgimd_torch.runs.signals import parser_of, say
 from sgimd_torch.spaces import Box, check_count, stream
 
 
@@ -39,7 +40,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     options = _options(argv)
     paths = [
-        path for place in options.runs for paths_of_variant in find_runs(place).values() for path in paths_of_variant
+        path for folder in options.runs for paths_of_variant in find_runs(folder).values() for path in paths_of_variant
     ]
     runs = [read_run(path) for path in dict.fromkeys(paths)]
     name, box = _reached_by(runs)

@@ -11,7 +11,8 @@ from typing import Final
 
 import numpy as np
 
-from sgimd_torch.changes.eras import Era, Exemplars, squared
+from sgimd_torch.extras.changes.eras import Era, squared
+from sgimd_torch.memory.exemplars import Exemplars
 from sgimd_torch.spaces import Array, Box
 
 _PRIOR_A: Final = 0.2  # prior standard deviation of a

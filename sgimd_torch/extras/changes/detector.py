@@ -14,11 +14,12 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from sgimd_torch.changes.calibration import Calibration, by_halves, shifted_by_halves
-from sgimd_torch.changes.eras import NEAR, SURE, Era, Exemplars, better, gains_over, squared
+from sgimd_torch.extras.changes.calibration import Calibration, by_halves, shifted_by_halves
+from sgimd_torch.extras.changes.eras import NEAR, SURE, Era, better, gains_over, squared
 from sgimd_torch.inverses.gaussian_process import one_thread
 from sgimd_torch.inverses.local_process import LocalProcess, predictions
 from sgimd_torch.memory import Memory, Rows
+from sgimd_torch.memory.exemplars import Exemplars
 from sgimd_torch.parts import Problem
 from sgimd_torch.spaces import Array
 
@@ -44,18 +45,16 @@ _CALIBRATED: Final = 12  # least number of movements that calibrate an earlier e
 _HELPS: Final = 2.0  # statistic T from which on earlier exemplars are kept
 
 
-class Restart(NamedTuple):
-    """What a learner begins again with.
+class Found(NamedTuple):
+    """What was found out when a learner is to begin again.
 
     Attributes:
-        exemplars: helpful exemplars of an earlier era, then all of the present era.
-        n_kept: number of the helpful ones.
+        kept: helpful exemplars of an earlier era; all of the present era follow them.
         n_before: number of exemplars of the earlier era.
         is_new: whether the present era has begun now.
     """
 
-    exemplars: Exemplars
-    n_kept: int
+    kept: Exemplars
     n_before: int
     is_new: bool
 
@@ -101,7 +100,7 @@ class ChangeDetector:
         if len(process.memory) >= _FIRST and len(self._surprises) >= _PREDICTED:
             self._accumulate(len(self.life) + 1)
 
-    def restart_if_changed(self, process: LocalProcess) -> Restart | None:
+    def restart_if_changed(self, process: LocalProcess) -> Found | None:
         """What to begin again with; None to go on."""
         n = len(self.life)
         if self._suspected_at < 0 and self._review and n - self.since >= self._review:
@@ -167,7 +166,7 @@ class ChangeDetector:
         return 0
 
     @one_thread
-    def _restart(self, *, is_new: bool) -> Restart:
+    def _restart(self, *, is_new: bool) -> Found:
         """Exemplars of earlier eras that help to predict this one, then all of this one."""
         current = Exemplars.of(self.life, slice(self.since, None))
         n, kept, n_before, best = len(current.thetas), current.some(slice(0)), 0, -np.inf
@@ -188,7 +187,7 @@ class ChangeDetector:
         self._review = _GROWTH * n if len(kept.thetas) else 0
         if is_new:
             self._reset_suspicion()
-        return Restart(kept.and_then(current), len(kept.thetas), n_before, is_new)
+        return Found(kept, n_before, is_new)
 
     def _process(self, exemplars: Exemplars, era: Era) -> Era:
         """A process of these exemplars; if they are few, with lengths and kernel of an earlier era."""

@@ -5,48 +5,20 @@ era = Era(fitted, exemplars); outcomes, variances, slopes = era.predict(movement
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple, Self
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sgimd_torch.inverses.local_process import FittedKernel, predictions
-from sgimd_torch.memory import Memory, Rows
+from sgimd_torch.memory import Rows
+from sgimd_torch.memory.exemplars import Exemplars
+from sgimd_torch.memory.growing import Growing
 from sgimd_torch.memory.neighbours import Neighbours
-from sgimd_torch.memory.table import Table
 from sgimd_torch.spaces import Array
 
 NEAR: Final = 60  # largest number of exemplars from which a movement is predicted
 SURE: Final = 3.5  # statistic T from which on a test is passed
 _LARGEST_GAIN: Final = 1.5  # bound of the log ratio of two errors
-
-
-class Exemplars(NamedTuple):
-    """Contexts, thetas and outcomes of some movements, ``(n, dim)`` each."""
-
-    contexts: Array
-    thetas: Array
-    outcomes: Array
-
-    @classmethod
-    def of(cls, memory: Memory, rows: slice | Rows = slice(None)) -> Self:
-        """Some exemplars of a memory."""
-        return cls(memory.contexts[rows], memory.thetas[rows], memory.outcomes[rows])
-
-    def some(self, rows: slice | Rows | NDArray[np.bool_]) -> Exemplars:
-        """Some of these exemplars."""
-        return Exemplars(*(table[rows] for table in self))
-
-    def and_then(self, others: Exemplars) -> Exemplars:
-        """These exemplars, then the others."""
-        return Exemplars(*map(np.concatenate, zip(self, others, strict=True)))
-
-    @property
-    def memory(self) -> Memory:
-        """A memory of these exemplars."""
-        memory = Memory(*(table.shape[1] for table in self))
-        memory.extend(*self)
-        return memory
 
 
 class Era:
@@ -55,7 +27,7 @@ class Era:
     def __init__(self, fitted: FittedKernel, exemplars: Exemplars) -> None:
         self.fitted, self.exemplars = fitted, exemplars
         inputs = self._in_lengths(exemplars)
-        self._neighbours = Neighbours(Table(inputs.shape[1]))
+        self._neighbours = Neighbours(Growing(inputs.shape[1]))
         self._neighbours.keys.append(inputs)
 
     def predict(self, movements: Exemplars) -> tuple[Array, Array, Array]:

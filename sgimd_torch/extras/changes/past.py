@@ -5,20 +5,19 @@ memory, notes, crc32 = past_of(task, Path("simulated/practice/seed-000/run.sqlit
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from sgimd_torch.environments.protocol import Environment
-from sgimd_torch.files import LARGE, check_regular, checksum, is_record
+from sgimd_torch.files import checksum, is_record, read_csv
 from sgimd_torch.learner.events import Kind
 from sgimd_torch.memory import Memory
-from sgimd_torch.options.signature import parsed
 from sgimd_torch.record import Dims, Record, Row, RunError
-from sgimd_torch.runs.tasks import Task
 from sgimd_torch.spaces import Box, check_vector
+from sgimd_torch.tasks import Task
+from sgimd_torch.texts import NUMBER
 
 
 def past_of(task: Task, path: Path, record: Path | None = None) -> tuple[Memory, list[str], str]:
@@ -92,23 +91,6 @@ def _listed(path: Path, robot: Environment) -> Iterator[Row]:
     for number, row in rows:
         cells = dict(zip(heads, row, strict=False))
         try:
-            yield tuple(parsed(cells.get(name, ""), float) for name in wanted)
+            yield tuple(NUMBER.of(cells.get(name, "")) for name in wanted)
         except ValueError as error:
             raise RunError(f"{path}: line {number} is no movement of {len(wanted)} numbers") from error
-
-
-def read_csv(path: Path) -> list[tuple[int, list[str]]]:
-    """The rows of a table with commas that have any field, each with the number of its line, from 1.
-
-    Raises:
-        ValueError: the file is no such table, or has more than 256 MB.
-        OSError: there is no file, or it is a pipe or a device.
-    """
-    check_regular(path)
-    if path.stat().st_size > LARGE:
-        raise ValueError(f"{path} has {path.stat().st_size} bytes, more than the {LARGE} that such a table may have")
-    with path.open(encoding="utf-8", newline="") as file:
-        try:
-            return [(rows.line_num, row) for rows in [csv.reader(file)] for row in rows if row]
-        except (csv.Error, UnicodeDecodeError) as error:
-            raise ValueError(f"{path} is no csv file: {error}") from error

@@ -31,17 +31,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sgimd_torch.environments.check import check_environment
 from sgimd_torch.environments.protocol import Environment, beside_execute, execute_many
-from sgimd_torch.environments.remarks import remarks_on
-from sgimd_torch.environments.sketch import traced
-from sgimd_torch.options.build import task_of
-from sgimd_torch.options.command_line import parse
-from sgimd_torch.runs.signals import parser_of
-from sgimd_torch.runs.tasks import Task, benchmark_of
-from sgimd_torch.runs.tasks.taught import demonstrations_of
+from sgimd_torch.extras.check.promises import check_environment
+from sgimd_torch.extras.check.remarks import remarks_on
+from sgimd_torch.extras.film.traced import traced
+from sgimd_torch.extras.recordings.command import check
+from sgimd_torch.options.parse import parse
+from sgimd_torch.runs.plan import task_of
+from sgimd_torch.runs.program import parser_of
 from sgimd_torch.spaces import Failure, check_count, stream
-from sgimd_torch.views.demonstrations import check
+from sgimd_torch.tasks import Task, benchmark_of
+from sgimd_torch.tasks.taught import demonstrations_of
 
 TRIED = 20  # number of random movements whose outcomes are looked at
 
@@ -122,9 +122,9 @@ def _lessons(task: Task) -> list[str]:
     if task.demonstrations is None:
         return ["  demonstrations: none"]
     demonstrations, notes, _ = demonstrations_of(task, None)
-    places = np.array([demonstration.outcome for demonstration in demonstrations])
+    outcomes = np.array([demonstration.outcome for demonstration in demonstrations])
     tried = [check(task, demonstration, row) for row, demonstration in enumerate(demonstrations[:TRIED])]
-    apart, spread = np.median([checked.apart for checked in tried]), np.linalg.norm(places.std(axis=0))
+    apart, spread = np.median([checked.apart for checked in tried]), np.linalg.norm(outcomes.std(axis=0))
     if not apart <= max(spread / 2, 3 * task.environment.outcome_noise):
         amount = task.environment.outcomes.amount(float(apart))
         notes = [

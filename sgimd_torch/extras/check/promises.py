@@ -11,7 +11,6 @@ from typing import Any, Final
 
 import numpy as np
 
-from sgimd_torch.environments.previous import WithPrevious
 from sgimd_torch.environments.protocol import (
     BatchEnvironment,
     Environment,
@@ -19,6 +18,7 @@ from sgimd_torch.environments.protocol import (
     check_robot,
     moves_in_batches,
 )
+from sgimd_torch.extras.previous.with_previous import WithPrevious
 from sgimd_torch.spaces import Array, Box, check_count, stream
 
 _FACTOR: Final = 10.0  # largest accepted ratio between announced and measured noise; a wrong unit exceeds it

@@ -26,14 +26,16 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Final
 
-from sgimd_torch.figures.names import label
+from sgimd_torch.extras.sweep.command import given_in, refuse
+from sgimd_torch.extras.sweep.parallel import Machine, sweep
+from sgimd_torch.extras.table.names import label
 from sgimd_torch.options.catalogue import ROD
-from sgimd_torch.options.command_line import parse
 from sgimd_torch.options.config import Config
-from sgimd_torch.runs.parallel import Machine, sweep
+from sgimd_torch.options.parse import parse
+from sgimd_torch.runs.messages import say
+from sgimd_torch.runs.program import Failed, parser_of
 from sgimd_torch.runs.read import finished, read_run
-from sgimd_torch.runs.signals import Failed, loading, parser_of, say
-from sgimd_torch.runs.sweep import given_in, refuse
+from sgimd_torch.runs.signals import loading
 
 LEARNERS: Final = {
     "random": "makes random movements",
@@ -52,11 +54,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     _, rest = parser().parse_known_args(argv)
     configs = configs_of(rest)
     with loading():  # a missing extra is reported before the runs, not after them
-        from sgimd_torch.figures.save import save_figure
-        from sgimd_torch.options.build import build
-        from sgimd_torch.views import table
-        from sgimd_torch.views.report.figures import figure_of_curves
-        from sgimd_torch.views.variants import Variant
+        from sgimd_torch.extras.report.figures import figure_of_curves
+        from sgimd_torch.extras.report.save import save_figure
+        from sgimd_torch.extras.table import command as table
+        from sgimd_torch.extras.table.variants import Variant
+        from sgimd_torch.runs.build import build
     began, base = time.monotonic(), configs["sgim-d"]
     for config in configs.values():
         build(config)  # a wrong option is refused before anything starts

@@ -21,8 +21,8 @@ import numpy as np
 from PIL import Image
 
 from sgimd_torch.environments.rod_physics import RodTrace
+from sgimd_torch.extras.film.reel import HEIGHT, WIDTH, Shot
 from sgimd_torch.spaces import Array
-from sgimd_torch.views.film.reel import HEIGHT, WIDTH, Shot
 
 MOST_PAST: Final = 250  # largest number of past landings in a frame; 250 landings double the time of drawing a frame
 
@@ -120,9 +120,9 @@ def draw_chain(scene: mujoco.MjvScene, points: Sequence[Array] | Array, radius: 
         mujoco.mjv_connector(add_geom(scene, kind, (width, 0, 0), start, colour), kind, width, start, stop)
 
 
-def add_geom(scene: mujoco.MjvScene, kind: int, size: Sequence[float], place: Array, colour: Colour) -> Any:
+def add_geom(scene: mujoco.MjvScene, kind: int, size: Sequence[float], position: Array, colour: Colour) -> Any:
     """Add a geom to the scene; MuJoCo defines the meaning of ``size`` (m) for each ``kind``."""
     geom = scene.geoms[scene.ngeom]
-    mujoco.mjv_initGeom(geom, kind, np.array(size), place, np.eye(3).ravel(), np.array(colour, np.float32))
+    mujoco.mjv_initGeom(geom, kind, np.array(size), position, np.eye(3).ravel(), np.array(colour, np.float32))
     scene.ngeom += 1
     return geom

@@ -27,15 +27,17 @@ import numpy as np
 from tqdm import tqdm
 
 from sgimd_torch.environments.protocol import beside_execute
-from sgimd_torch.environments.sketch import Sketch, traced
+from sgimd_torch.environments.sketch import Sketch
 from sgimd_torch.evaluation import evaluate
-from sgimd_torch.figures.names import colour, label
+from sgimd_torch.extras.film.reel import RATES, Painter, Shot, check_film, shoot, write_film
+from sgimd_torch.extras.film.sketch import Sketchbook, panel
+from sgimd_torch.extras.film.traced import traced
+from sgimd_torch.extras.table.names import colour, label
 from sgimd_torch.runs.load import OpenRun
+from sgimd_torch.runs.messages import say
+from sgimd_torch.runs.program import parser_of
 from sgimd_torch.runs.read import Run
-from sgimd_torch.runs.signals import parser_of, say
 from sgimd_torch.spaces import Array, stream
-from sgimd_torch.views.film.reel import RATES, Painter, Shot, check_film, shoot, write_film
-from sgimd_torch.views.film.sketch import Sketchbook, panel
 
 EXAMPLES = """examples:
   sgimd film runs/sgim-d/seed-003                               six goals, into runs/sgim-d/seed-003.mp4
@@ -108,8 +110,8 @@ def _painter(robot: Any, shots: Sequence[Shot]) -> AbstractContextManager[Painte
     """The painter for a robot and its shots."""
     sketched = isinstance(shots[0].recording, Sketch)
     if not sketched or hasattr(shots[0].recording, "states"):
-        from sgimd_torch.views.film.camera import Camera  # only these need OpenGL
-        from sgimd_torch.views.film.model_camera import ModelCamera
+        from sgimd_torch.extras.film.camera import Camera  # only these need OpenGL
+        from sgimd_torch.extras.film.model_camera import ModelCamera
 
         try:
             return ModelCamera(robot, shots) if sketched else Camera(robot.model)
@@ -128,7 +130,7 @@ def _cast(run: OpenRun, goals: Array, context: Array, stages: Sequence[int]) -> 
     over all stages. If there is one stage, the curve has the evaluations of the run.
 
     Args:
-        run: opened run; its learner repeats the record as far as needed.
+        run: opened run; its learner has the memory of each stage in turn.
         goals: ``(n, outcome_dim)`` goals to film.
         context: ``(context_dim,)`` context of all movements.
         stages: numbers of movements; robots that move at once end the last movements together, so there may be more.
@@ -141,7 +143,7 @@ def _cast(run: OpenRun, goals: Array, context: Array, stages: Sequence[int]) -> 
     who = label(config["name"] or config["algorithm"])
     shots, reached, errors = list[Shot](), list[int](), list[Array]()
     for stage in stages:
-        run.replay(stage)
+        run.recall(stage)
         inverse, movements = parts.learner.inverse, parts.learner.movements
         if not len(parts.learner.memory):
             raise ValueError(

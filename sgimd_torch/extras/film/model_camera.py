@@ -17,10 +17,10 @@ import mujoco
 import numpy as np
 from PIL import Image
 
-from sgimd_torch.environments.mujoco_robot import Filmed, MujocoRobot
+from sgimd_torch.extras.film.camera import GOAL, MOST_PAST, Colour, MujocoPainter, add_geom, draw_chain
+from sgimd_torch.extras.film.reel import HEIGHT, WIDTH, Shot
+from sgimd_torch.extras.models.mujoco_robot import Filmed, MujocoRobot
 from sgimd_torch.spaces import Array
-from sgimd_torch.views.film.camera import GOAL, MOST_PAST, Colour, MujocoPainter, add_geom, draw_chain
-from sgimd_torch.views.film.reel import HEIGHT, WIDTH, Shot
 
 FILLED: Final = 0.8  # share of the picture, in height and width, that shows robot and T
 BORDER: Final = (0.08, 0.28, 0.36, 1.0)  # colour of the border of T

@@ -21,12 +21,12 @@ from matplotlib.patches import Rectangle
 from PIL import Image
 
 from sgimd_torch.environments.sketch import Sketch
-from sgimd_torch.figures.axes import limits, over_movements
-from sgimd_torch.figures.learning import misses
-from sgimd_torch.figures.save import STYLE, pixels
-from sgimd_torch.figures.sections import sections
+from sgimd_torch.extras.film.reel import HEIGHT, WIDTH, Frame, Shot
+from sgimd_torch.extras.pictures.maps import misses, pixels
+from sgimd_torch.extras.pictures.sections import sections
+from sgimd_torch.extras.report.maps import limits, over_movements
+from sgimd_torch.extras.report.save import STYLE
 from sgimd_torch.spaces import Array, Box, rounded
-from sgimd_torch.views.film.reel import HEIGHT, WIDTH, Frame, Shot
 
 MARGINS: Final = (0.06, 0.11)  # margins as shares of the width and the height of the picture
 DPI: Final = 100

@@ -7,7 +7,7 @@ can replace `Sinusoids`. ``correspondence`` of both translates a recording to th
 
 from __future__ import annotations
 
-from typing import Final, Protocol
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,19 +17,6 @@ from sgimd_torch.spaces import Array, Box
 
 _GRID: Final = 200  # number of frequencies that the fit tries before it refines the best of them
 STEER: Final = 0.5  # largest offset, relative to half the range of the command
-
-
-class Controller(Protocol):
-    """An open-loop controller: the commands of a movement depend on its theta alone."""
-
-    @property
-    def policies(self) -> Box:
-        """Pi."""
-        ...
-
-    def at(self, theta: Array, times: Array) -> Array:
-        """Commands ``(n_times, n_commands)`` at ``times`` ``(n_times,)`` s after the start."""
-        ...
 
 
 class Sinusoids(Primitive):

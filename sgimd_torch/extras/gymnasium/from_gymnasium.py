@@ -17,9 +17,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.environments.controllers import Controller
+from sgimd_torch.environments.motor_primitives import Controller
 from sgimd_torch.environments.protocol import Primitive, SimulationError, check_movement, check_recording, check_robot
-from sgimd_torch.environments.remarks import FEWEST, LATEST
+from sgimd_torch.extras.check.remarks import FEWEST, LATEST
 from sgimd_torch.spaces import Array, Box, check_count, check_point, check_rng, stream
 
 try:

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.environments.from_gymnasium import gymnasium
 from sgimd_torch.environments.protocol import Environment
+from sgimd_torch.extras.gymnasium.from_gymnasium import gymnasium
 from sgimd_torch.spaces import Array, Box, check_point
 
 Observation = dict[str, Array]

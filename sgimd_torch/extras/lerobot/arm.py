@@ -24,12 +24,13 @@ from typing import Any, ClassVar, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.environments.mujoco_robot import MujocoRobot
+from sgimd_torch.calls import with_keywords_of
 from sgimd_torch.environments.protocol import SimulationError, check_movement, check_robot, reason_of, tried
-from sgimd_torch.options.catalogue import load_place, unknown_name_error
-from sgimd_torch.options.signature import with_keywords_of
+from sgimd_torch.extras.models.mujoco_robot import MujocoRobot
+from sgimd_torch.extras.recordings.units import in_rad, units_from, units_of
+from sgimd_torch.options.catalogue import load_reference
 from sgimd_torch.spaces import Array, Demonstration, Failure, check_point
-from sgimd_torch.units import in_rad, units_from, units_of
+from sgimd_torch.texts import unknown_name_error
 
 PATIENCE: Final = 0.06  # s in which a call whose packet is lost is tried again
 PAUSE: Final = 0.01  # s between two tries
@@ -108,8 +109,8 @@ class LeRobotArm:
         for name, text, example in (("robot", robot, "so101_follower"), ("units", units, "deg,gripper=0:100")):
             if not text:
                 raise ValueError(f"{name} is missing, such as {example}")
-        self._make = load_place("robot", robot) if ":" in robot else partial(_of_lerobot, robot, port, robot_id)
-        self._see = load_place("seen_by", seen_by) if seen_by else None
+        self._make = load_reference("robot", robot) if ":" in robot else partial(_of_lerobot, robot, port, robot_id)
+        self._see = load_reference("seen_by", seen_by) if seen_by else None
         self.robot, self._buses = self._made()
         self._twin = twin = MujocoRobot(model, outcome=outcome, outcome_noise=outcome_noise, settle=settle, **of_model)
         self.contexts, self.policies, self.outcomes, self.rest = twin.contexts, twin.policies, twin.outcomes, twin.rest

@@ -1,1 +1,4 @@
-"""Model files of MuJoCo: reading, places, servos, the start posture, and a look before the first movement."""
+"""Robots from model files, MJCF or URDF, simulated by MuJoCo."""
+
+WORDS = "environment  mujoco_robot  mujoco=MujocoRobot"
+PUBLIC = "mujoco_robot  MujocoRobot"

@@ -15,13 +15,13 @@ from xml.etree import ElementTree
 import mujoco
 import numpy as np
 
-from sgimd_torch.environments.models.look import listed
-from sgimd_torch.environments.models.places import joint_of, movable, pulled
-from sgimd_torch.environments.models.posture import nearest_posture, touching, within_ranges
-from sgimd_torch.environments.models.servos import joints_to_serve, serve
+from sgimd_torch.extras.models.look import listed
+from sgimd_torch.extras.models.places import joint_of, movable, pulled
+from sgimd_torch.extras.models.posture import nearest_posture, touching, within_ranges
+from sgimd_torch.extras.models.servos import joints_to_serve, serve
 from sgimd_torch.files import check_regular
-from sgimd_torch.options.catalogue import unknown_name_error
 from sgimd_torch.spaces import check_point
+from sgimd_torch.texts import unknown_name_error
 
 SERVOS: Final = ("auto", "file", "made")
 _FOLDERS: Final = ("assetdir", "meshdir", "texturedir")  # attributes of a compiler
@@ -147,9 +147,9 @@ def _check_parts(path: Path) -> None:
     folders = {path.parent / compiler.get(kind, "") for compiler in compilers for kind in _FOLDERS} | {path.parent}
     for element in elements:
         for file in (text for name, text in element.attrib.items() if name.startswith("file")):
-            for place in (folder / name for folder in folders for name in (file, Path(file).name)):
-                if place.exists():
-                    check_regular(place)
+            for mesh in (folder / name for folder in folders for name in (file, Path(file).name)):
+                if mesh.exists():
+                    check_regular(mesh)
 
 
 def _root(path: Path) -> ElementTree.Element:
@@ -210,15 +210,15 @@ def _without(spec: mujoco.MjSpec, model: mujoco.MjModel, pairs: set[tuple[int, i
 
 
 def _of_package(path: Path, file: str) -> str:
-    """The place of package://NAME/FILE, a mesh of ROS, in the folder NAME or beside it; other files unchanged."""
+    """The path of package://NAME/FILE, a mesh of ROS, in the folder NAME or beside it; other files unchanged."""
     head, _, rest = file.removeprefix("package://").partition("/")
     if not file.startswith("package://"):
         return file
-    places = [folder / name for folder in path.resolve().parents for name in (f"{head}/{rest}", rest)]
-    place = next((place for place in places if place.is_file()), None)
-    if place is None:
+    found = [folder / name for folder in path.resolve().parents for name in (f"{head}/{rest}", rest)]
+    mesh = next((path for path in found if path.is_file()), None)
+    if mesh is None:
         raise ValueError(f"no folder from {path.resolve().parent} up has the mesh {file}; put the folder {head} there")
-    return str(place)
+    return str(mesh)
 
 
 def _with_advice(said: str, path: Path) -> str:

@@ -11,7 +11,7 @@ from typing import Final
 import mujoco
 import numpy as np
 
-from sgimd_torch.environments.models.places import UNITS, joints_above, movable, pulled
+from sgimd_torch.extras.models.places import UNITS, joints_above, movable, pulled
 from sgimd_torch.spaces import Array, Box
 
 NEARLY: Final = 1e-3  # share of a side of Pi by which two nearly equal thetas differ

@@ -18,10 +18,12 @@ import numpy as np
 from mujoco import rollout
 from numpy.typing import ArrayLike
 
-from sgimd_torch.environments.controllers import Controller
-from sgimd_torch.environments.models.file import file_of, load_model
-from sgimd_torch.environments.models.look import NEARLY, SUNK, listed, missed, parts, reached
-from sgimd_torch.environments.models.places import (
+from sgimd_torch.environments.motor_primitives import Controller, GaussianPrimitive
+from sgimd_torch.environments.protocol import Primitive, SimulationError, check_movement, check_robot
+from sgimd_torch.environments.sketch import Sketch
+from sgimd_torch.extras.models.file import file_of, load_model
+from sgimd_torch.extras.models.look import NEARLY, SUNK, listed, missed, parts, reached
+from sgimd_torch.extras.models.places import (
     body_of,
     check_moved,
     commands_box,
@@ -40,10 +42,7 @@ from sgimd_torch.environments.models.places import (
     pulled,
     slides_on,
 )
-from sgimd_torch.environments.models.posture import touching
-from sgimd_torch.environments.motor_primitives import GaussianPrimitive
-from sgimd_torch.environments.protocol import Primitive, SimulationError, check_movement, check_robot
-from sgimd_torch.environments.sketch import Sketch
+from sgimd_torch.extras.models.posture import touching
 from sgimd_torch.spaces import Array, Box, check_count, check_point, check_rng, read_only, stream
 
 EXPLORED: Final = 300  # number of random movements that find T

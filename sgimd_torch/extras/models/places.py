@@ -13,9 +13,8 @@ from typing import Final
 import mujoco
 import numpy as np
 
-from sgimd_torch.options.catalogue import did_you_mean
-from sgimd_torch.options.signature import parsed
 from sgimd_torch.spaces import Array, Box
+from sgimd_torch.texts import NUMBER, did_you_mean
 
 _COUNTS: Final = {"site": "nsite", "body": "nbody", "geom": "ngeom", "joint": "njnt"}
 _AXES: Final = "xyz"
@@ -114,7 +113,7 @@ def context_box(model: mujoco.MjModel, context: str) -> tuple[Box, list[int]]:
                 raise ValueError(f"{what}: only a body with a free joint has an axis x, y or z; else write joint:NAME")
             address = int(model.jnt_qposadr[joint]) + _AXES.index(words[1])
         try:
-            sides.append([parsed(low, float), parsed(high, float)])
+            sides.append([NUMBER.of(low), NUMBER.of(high)])
             Box(*np.array(sides[-1:]).T)
         except ValueError:
             raise ValueError(f"{what}: {low} and {high} must be two numbers, the lower one first") from None

@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 from scipy.optimize import minimize
 
-from sgimd_torch.environments.models.places import movable
+from sgimd_torch.extras.models.places import movable
 from sgimd_torch.spaces import Array
 
 NEAR: Final = 0.004  # m, distance of two geoms that counts as a contact while a posture is looked for

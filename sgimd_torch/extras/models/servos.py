@@ -12,7 +12,7 @@ from typing import Final
 import mujoco
 import numpy as np
 
-from sgimd_torch.environments.models.places import is_servo, joint_of, joints_above, movable, pulled
+from sgimd_torch.extras.models.places import is_servo, joint_of, joints_above, movable, pulled
 from sgimd_torch.spaces import Array, stream
 
 FREQUENCY: Final = 30.0  # rad/s, natural frequency of a servo

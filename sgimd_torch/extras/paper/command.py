@@ -26,19 +26,21 @@ from pathlib import Path
 from typing import Final
 
 from sgimd_torch.demonstrations import SHIPPED
+from sgimd_torch.extras.paper import figures
+from sgimd_torch.extras.paper.replication import LEARNERS, TAUGHT, Replication
+from sgimd_torch.extras.report import provenance
+from sgimd_torch.extras.report.command import rendered
+from sgimd_torch.extras.sweep.command import add_options, given_in, refuse, run_all
+from sgimd_torch.extras.table.results import results
+from sgimd_torch.extras.table.statistics import LEAST_SEEDS
+from sgimd_torch.extras.table.variants import Variant, best_first
 from sgimd_torch.files import write_text
 from sgimd_torch.options.catalogue import ROD
-from sgimd_torch.options.command_line import parse
 from sgimd_torch.options.config import Config
+from sgimd_torch.options.parse import parse
+from sgimd_torch.runs.messages import say
+from sgimd_torch.runs.program import parser_of
 from sgimd_torch.runs.read import Run, finished, read_run
-from sgimd_torch.runs.signals import parser_of, say
-from sgimd_torch.runs.sweep import add_options, given_in, refuse, run_all
-from sgimd_torch.views.report import paper_figures, provenance
-from sgimd_torch.views.report.command import rendered
-from sgimd_torch.views.report.replication import LEARNERS, TAUGHT, Replication
-from sgimd_torch.views.results import results
-from sgimd_torch.views.statistics import LEAST_SEEDS
-from sgimd_torch.views.variants import Variant, best_first
 
 PARTS: Final[dict[str, tuple[tuple[str, ...], tuple[str, ...]]]] = {
     "": (LEARNERS, ()),
@@ -131,7 +133,7 @@ def page(plan: Mapping[str, Config], seeds: Sequence[int]) -> str:
     }
     five = best_first(variants[name] for name in LEARNERS)
     return rendered(
-        "paper.html.j2",
+        Path(__file__).with_name("paper.html.j2"),
         config=plan["sgim-d"],
         study=Replication(plan["sgim-d"], variants),
         variants=list(variants.values()),
@@ -140,7 +142,7 @@ def page(plan: Mapping[str, Config], seeds: Sequence[int]) -> str:
         warnings=list(provenance.warnings(list(variants.values()))),
         n_seeds=len(seeds),
         least_seeds=LEAST_SEEDS,
-        figures=paper_figures,
+        figures=figures,
         provenance=provenance,
     )
 

@@ -12,11 +12,11 @@ from typing import Final
 import numpy as np
 from matplotlib.figure import Figure
 
-from sgimd_torch.figures.learning import landing_points
-from sgimd_torch.figures.names import COLOURS, NAMES
-from sgimd_torch.figures.sections import sections
-from sgimd_torch.views.report.figures import draw_curves, png
-from sgimd_torch.views.report.replication import BY, LEARNERS, SMALL, TAUGHT, TILE, Replication
+from sgimd_torch.extras.paper.replication import BY, LEARNERS, SMALL, TAUGHT, TILE, Replication
+from sgimd_torch.extras.pictures.sections import sections
+from sgimd_torch.extras.report.figures import draw_curves, png
+from sgimd_torch.extras.report.maps import landing_points
+from sgimd_torch.extras.table.names import COLOURS, NAMES
 
 THREE: Final = ("random", "sagg-riac", "sgim-d")
 OF_DEMONSTRATOR: Final = {1: "#0072b2", 2: "#e69f00", 3: "#d55e00"}
@@ -111,9 +111,9 @@ def parameters(figure: Figure, study: Replication) -> None:
     titles = {"recordings": study.demonstrated, "movements of SGIM-D, by demonstrator": study.taught}
     for ax, (title, groups) in zip(axes, titles.items(), strict=True):
         for k, thetas in groups.items():
-            places = np.arange(thetas.shape[1]) + 0.22 * (k - 2)
+            points = np.arange(thetas.shape[1]) + 0.22 * (k - 2)
             ax.errorbar(
-                places,
+                points,
                 thetas.mean(axis=0),
                 thetas.std(axis=0),
                 fmt="o",
@@ -154,9 +154,9 @@ def repeated(figure: Figure, study: Replication) -> None:
     whole, near = figure.subplots(1, 2)
     landed = study.repeated[: len(OF_DEMONSTRATOR)]
     around = landed - landed.mean(axis=1, keepdims=True)
-    for ax, places in ((whole, landed), (near, around)):
-        for (k, colour), points in zip(OF_DEMONSTRATOR.items(), places, strict=True):
-            ax.plot(*points.T, ".", color=colour, markersize=5, label=f"policy {k}")
+    for ax, points in ((whole, landed), (near, around)):
+        for (k, colour), outcomes in zip(OF_DEMONSTRATOR.items(), points, strict=True):
+            ax.plot(*outcomes.T, ".", color=colour, markersize=5, label=f"policy {k}")
     whole.set(xlim=(-1, 1), ylim=(-1, 1), title="in T", xlabel="x (m)", ylabel="y (m)", aspect="equal")
     most = 1.1 * float(np.abs(around).max())
     near.set(

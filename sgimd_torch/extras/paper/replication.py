@@ -14,14 +14,14 @@ from scipy import stats
 
 from sgimd_torch.demonstrations import SHIPPED, load_demonstrations
 from sgimd_torch.environments.protocol import execute_many
-from sgimd_torch.figures.names import NAMES
-from sgimd_torch.options.build import task_of
+from sgimd_torch.extras.table.names import NAMES
+from sgimd_torch.extras.table.results import MISSING
+from sgimd_torch.extras.table.statistics import Interval, interval_text
+from sgimd_torch.extras.table.variants import Variant
 from sgimd_torch.options.config import Config
-from sgimd_torch.runs.tasks.taught import theta_of
+from sgimd_torch.runs.plan import task_of
 from sgimd_torch.spaces import Array, Box, Demonstration, stream
-from sgimd_torch.views.results import MISSING
-from sgimd_torch.views.statistics import Interval, interval_text
-from sgimd_torch.views.variants import Variant
+from sgimd_torch.tasks.taught import theta_of
 
 LEARNERS: Final = ("random", "sagg-riac", "observation", "imitation", "sgim-d")
 TAUGHT: Final = ("observation", "imitation", "sgim-d")

@@ -13,11 +13,12 @@ from typing import Final
 
 import numpy as np
 
-from sgimd_torch.changes.eras import SURE, Era, Exemplars, better
+from sgimd_torch.extras.changes.eras import SURE, Era, better
 from sgimd_torch.inverses.gaussian_process import one_thread
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Learner
 from sgimd_torch.learner.events import Kind
+from sgimd_torch.memory.exemplars import Exemplars
 from sgimd_torch.parts import Problem
 from sgimd_torch.spaces import Array
 

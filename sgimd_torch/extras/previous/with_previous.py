@@ -34,6 +34,7 @@ class WithPrevious:
     """
 
     at_once = 1  # of several robots, each has a movement before of its own
+    asks_context = "the theta of the movement before"  # without it an answer means nothing
 
     def __init__(self, robot: Environment) -> None:
         self.robot = robot

@@ -79,7 +79,7 @@ class Recording(NamedTuple):
     fault: str = ""
 
 
-class Table(NamedTuple):
+class Sheet(NamedTuple):
     """Columns of a file.
 
     Attributes:
@@ -95,7 +95,7 @@ class Table(NamedTuple):
     entries: Mapping[str, Sequence[str]]
 
 
-def recordings_of(table: Table, names: ColumnNames) -> list[Recording]:
+def recordings_of(table: Sheet, names: ColumnNames) -> list[Recording]:
     """The recordings of one table. A fault of one recording is told in its ``fault``, with the row.
 
     Raises:
@@ -116,7 +116,7 @@ def recordings_of(table: Table, names: ColumnNames) -> list[Recording]:
     return recordings
 
 
-def _times(table: Table, names: ColumnNames, rows: slice) -> Array:
+def _times(table: Sheet, names: ColumnNames, rows: slice) -> Array:
     """``(n_samples,)`` s, from 0."""
     if names.rate is not None:
         return np.arange(rows.stop - rows.start) / names.rate
@@ -130,7 +130,7 @@ def _times(table: Table, names: ColumnNames, rows: slice) -> Array:
     return times[:, 0] - times[0, 0]
 
 
-def _moments(table: Table, column: str, rows: slice) -> list[float]:
+def _moments(table: Sheet, column: str, rows: slice) -> list[float]:
     """Times of a column of dates, or of ISO texts, as s after the first; [] for a column of numbers."""
     values = table.columns.get(column, np.empty(0))[rows].tolist()  # empty: the entry of a vector
     first = next(iter(values), 0.0)
@@ -148,7 +148,7 @@ def _moments(table: Table, column: str, rows: slice) -> list[float]:
     return [(moment - moments[0]).total_seconds() for moment in moments]
 
 
-def _values(table: Table, names: Sequence[str], rows: slice) -> tuple[Array, list[str]]:
+def _values(table: Sheet, names: Sequence[str], rows: slice) -> tuple[Array, list[str]]:
     """``(n_samples, dim)`` values of the columns ``names``, side by side, and the name of each dimension."""
     parts, labels = [np.empty((rows.stop - rows.start, 0))], list[str]()
     for name in names:
@@ -173,7 +173,7 @@ def _values(table: Table, names: Sequence[str], rows: slice) -> tuple[Array, lis
     return np.concatenate(parts, axis=1), labels
 
 
-def _numbers(table: Table, column: str, rows: slice) -> Array:
+def _numbers(table: Sheet, column: str, rows: slice) -> Array:
     """``(n_samples, k)`` numbers of a column of vectors or texts; a column of single numbers has k = 1."""
     values = table.columns[column][rows]
     if values.dtype.kind != "U":
@@ -189,7 +189,7 @@ def _numbers(table: Table, column: str, rows: slice) -> Array:
     return np.array([[float(text.replace(",", "."))] for text in values.tolist()])
 
 
-def _groups(table: Table, recording: str | None) -> list[tuple[str, slice]]:
+def _groups(table: Sheet, recording: str | None) -> list[tuple[str, slice]]:
     """Pairs (name for messages, rows), one for each recording, in order."""
     if recording is None:
         return [(table.name, slice(0, len(table.rows)))]

@@ -35,10 +35,7 @@ from typing import Any, Final
 import numpy as np
 
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
-from sgimd_torch.demonstrations.columns import ColumnNames, Recording
-from sgimd_torch.demonstrations.fit import beyond_limits, misfit_of
-from sgimd_torch.demonstrations.text import read_text
-from sgimd_torch.demonstrations.units import in_units, paced
+from sgimd_torch.demonstrations.fit import misfit_of
 from sgimd_torch.environments.protocol import (
     Replaying,
     SimulationError,
@@ -47,15 +44,20 @@ from sgimd_torch.environments.protocol import (
     primitive_of,
     tried,
 )
+from sgimd_torch.extras.recordings.columns import ColumnNames, Recording
+from sgimd_torch.extras.recordings.limits import beyond_limits
+from sgimd_torch.extras.recordings.text import read_text
+from sgimd_torch.extras.recordings.units import in_units, paced, units_from
+from sgimd_torch.extras.table.results import print_table
 from sgimd_torch.files import check_regular, check_writable
-from sgimd_torch.options.build import task_of
-from sgimd_torch.options.command_line import parse
-from sgimd_torch.runs.signals import parsed_argument, parser_of, say
-from sgimd_torch.runs.tasks import Task
-from sgimd_torch.runs.tasks.taught import theta_of
+from sgimd_torch.options.parse import parse
+from sgimd_torch.runs.messages import say
+from sgimd_torch.runs.plan import task_of
+from sgimd_torch.runs.program import argument, parser_of
 from sgimd_torch.spaces import Array, Box, Demonstration, Failure, stream
-from sgimd_torch.units import units_from
-from sgimd_torch.views.results import print_table
+from sgimd_torch.tasks import Task
+from sgimd_torch.tasks.taught import theta_of
+from sgimd_torch.texts import NUMBER
 
 HEADS: Final = ("recording", "lasts (s)", "samples", "says", "lands", "apart", "misfit", "remarks")
 
@@ -225,7 +227,7 @@ def read_recordings(options: argparse.Namespace, ranges: Box | None) -> list[Rec
         recordings = [Recording(str(row), demonstration, names) for row, demonstration in enumerate(demonstrations)]
         units = {"": "rad", **units}
     elif is_dataset:
-        from sgimd_torch.demonstrations.lerobot import read_lerobot  # loads pyarrow, an optional dependency
+        from sgimd_torch.extras.recordings.lerobot import read_lerobot  # loads pyarrow, an optional dependency
 
         recordings, unclear = read_lerobot(source, _columns(options, ranges, "timestamp", "episode_index"))
     else:
@@ -329,7 +331,7 @@ def _names(text: str) -> tuple[str, ...]:
 
 
 def _above_zero(text: str) -> float:
-    value = parsed_argument(text, float)
+    value = argument(NUMBER, text)
     if not 0 < value < np.inf:
         raise argparse.ArgumentTypeError(f"must be above 0, got {text}")
     return value

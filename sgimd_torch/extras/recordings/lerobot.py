@@ -20,9 +20,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from sgimd_torch.demonstrations.columns import ColumnNames, Recording, Table, recordings_of
-from sgimd_torch.demonstrations.text import POINTER
-from sgimd_torch.files import check_density, check_regular
+from sgimd_torch.extras.recordings.columns import ColumnNames, Recording, Sheet, recordings_of
+from sgimd_torch.extras.recordings.text import POINTER
+from sgimd_torch.files import check_regular
 
 try:
     import pyarrow
@@ -31,7 +31,6 @@ except ImportError as error:
     raise ImportError(f"a LeRobot dataset needs pyarrow: pip install 'sgimd-torch[lerobot]' ({error})") from error
 
 STATE: Final = "observation.state"  # the feature that is meant if several have an entry of one name
-_NUMBERS: Final = ("INT32", "INT64", "FLOAT", "DOUBLE")  # parquet's names of types
 _RECORD_SHARES: Final = ("so100", "so101", "koch", "lekiwi")  # robots that record shares of the ranges of joints
 
 
@@ -74,7 +73,7 @@ def read_lerobot(root: str | os.PathLike[str], names: ColumnNames) -> tuple[list
     parts = [_columns(file, names.columns) for file in files]
     columns = {name: np.concatenate([part[name] for part in parts]) for name in names.columns}
     n_rows = len(columns[names.columns[0]])
-    recordings = recordings_of(Table(root.name, columns, range(n_rows), entries), names)
+    recordings = recordings_of(Sheet(root.name, columns, range(n_rows), entries), names)
     for noun, key, n in (("frames", "total_frames", n_rows), ("episodes", "total_episodes", len(recordings))):
         if names.recording == "episode_index" and info.get(key) != n:
             raise ValueError(f"{root} says {info.get(key)} {noun}, but {n} were found; is a file missing?")
@@ -126,17 +125,8 @@ def _columns(file: Path, names: list[str]) -> dict[str, np.ndarray]:
         if content.read(len(POINTER)) == POINTER.encode():
             raise ValueError(f"{file} is a pointer of Git LFS, not the file itself; git lfs pull gets the file")
     try:
-        about = pyarrow.parquet.read_metadata(file)
-        groups = [about.row_group(k) for k in range(about.num_row_groups)]
-        chunks = [group.column(k) for group in groups for k in range(group.num_columns)]
-        prefixes = tuple(f"{name}." for name in names)
-        chunks = [chunk for chunk in chunks if f"{chunk.path_in_schema}.".startswith(prefixes)]
-        for chunk in chunks:
-            if chunk.physical_type not in _NUMBERS:  # few bytes may stand for any number of long texts
-                raise ValueError(f"{chunk.path_in_schema} has {chunk.physical_type}, no numbers")
-        check_density(sum(8 * chunk.num_values for chunk in chunks), file)
         table = pyarrow.parquet.read_table(file, columns=names, page_checksum_verification=True)
         return {name: np.array(table.column(name).to_pylist()) for name in names}
     # ValueError: vectors differ in length.
-    except (pyarrow.ArrowException, OSError, ValueError, KeyError, MemoryError, OverflowError) as error:
+    except (pyarrow.ArrowException, OSError, ValueError, KeyError) as error:
         raise ValueError(f"{file} cannot be read: {str(error)[:200]}; is it whole, with columns {names}?") from error

@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from sgimd_torch.demonstrations.columns import NUMBER, ColumnNames, Recording, Table, recordings_of
+from sgimd_torch.extras.recordings.columns import NUMBER, ColumnNames, Recording, Sheet, recordings_of
 from sgimd_torch.files import check_regular
 
 SUFFIXES: Final = (".csv", ".tsv", ".txt", ".dat")
@@ -47,7 +47,7 @@ def read_text(path: str | os.PathLike[str], names: ColumnNames) -> list[Recordin
     return recordings
 
 
-def _table(file: Path, names: ColumnNames) -> Table:
+def _table(file: Path, names: ColumnNames) -> Sheet:
     """Columns of a file, as arrays of text.
 
     Raises:
@@ -91,7 +91,7 @@ def _table(file: Path, names: ColumnNames) -> Table:
         raise ValueError(
             "it has decimal commas beside points, or beside commas between columns; do they mark thousands?"
         )
-    return Table(file.name, columns, numbers, {})
+    return Sheet(file.name, columns, numbers, {})
 
 
 def _split(lines: Sequence[str], mark: str) -> list[list[str]]:

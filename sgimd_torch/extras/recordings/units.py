@@ -1,20 +1,25 @@
 """Recordings as a robot needs them: joints in rad, at another speed, without the pauses at their ends.
 
-recordings = [paced(recording, 2.0) for recording in in_units(recordings, {"": "deg", "gripper": "0:100"}, ranges)]
+units = units_from("deg,gripper=0:100")         # as a user writes them; the name "" means all other joints
+recordings = [paced(recording, 2.0) for recording in in_units(recordings, units, ranges)]
+scale, shift = in_rad("gripper", "0:100", (0.0, 1.2))       # rad = scale * value + shift
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from difflib import get_close_matches
+from math import pi
 from typing import Final
 
 import numpy as np
 
-from sgimd_torch.demonstrations.columns import Recording
+from sgimd_torch.extras.recordings.columns import Recording
 from sgimd_torch.spaces import Array, Box
-from sgimd_torch.units import in_rad, units_of
 
+_RANGE: Final = re.compile(r"(-?\d+\.?\d*):(-?\d+\.?\d*)", re.ASCII)
 _TURN: Final = 7.0  # rad, a little more than a turn; a joint that reads more may be in degrees
 _MOVES: Final = 0.02  # rad/s; joints that were never faster count as unmoved
 _STILL: Final = 0.05  # share of the largest speed of a recording; while all joints are slower, they pause
@@ -94,3 +99,48 @@ def moving(times: Array, joints: Array) -> tuple[Array, Array]:
         raise ValueError(f"it moves in {len(moved)} of {len(speeds)} steps and else hardly; has it a jerk?")
     first, last = moved[0], moved[-1] + 1
     return times[first : last + 1] - times[first], joints[first : last + 1]
+
+
+def units_from(text: str) -> dict[str, str]:
+    """Units by name of the joint, of a text such as "deg,gripper=0:100"; the name of a unit alone is ""."""
+    parts = [part.rpartition("=") for part in text.split(",") if part.strip()]
+    return {joint.strip(): unit.strip() for joint, _, unit in parts}
+
+
+def units_of(joints: Sequence[str], units: Mapping[str, str]) -> dict[str, str]:
+    """The unit of each joint that has one; ``units`` are as of ``units_from``, where gripper means gripper.pos, too.
+
+    Raises:
+        ValueError: a name is no joint.
+    """
+    unit_of = dict[str, str]()
+    for key, unit in sorted(units.items()):  # "" first
+        named = [joint for joint in joints if key in ("", joint, joint.partition(".")[0])]
+        if joints and not named:
+            near = " or ".join(get_close_matches(key, joints, 3, 0.0))
+            raise ValueError(f"unit {key}={unit}: no joint is named {key}; did you mean {near}?")
+        unit_of |= dict.fromkeys(named, unit)
+    return unit_of
+
+
+def in_rad(joint: str, unit: str, side: tuple[float, float] | None) -> tuple[float, float]:
+    """Scale and shift that make rad of a joint's values: rad = scale * value + shift.
+
+    Args:
+        joint: name of the joint, for messages.
+        unit: "rad", "deg", or two values of the joint at the ends of its range, such as "0:100" or "90:-110".
+        side: lowest and highest position (rad) of the joint; None if they are unknown.
+
+    Raises:
+        ValueError: the unit is unknown, or a range has no joint to map onto.
+    """
+    match = _RANGE.fullmatch(unit)
+    first, last = map(float, match.groups()) if match else (0.0, 0.0)
+    if first == last:
+        if unit not in ("rad", "deg"):
+            raise ValueError(f"the unit of {joint} must be rad, deg or a range such as -100:100, got {unit}")
+        return (pi / 180 if unit == "deg" else 1.0), 0.0
+    if side is None:
+        raise ValueError(f"{joint}={unit} maps onto the range of a joint of a robot; name it by --environment")
+    scale = (side[1] - side[0]) / (last - first)
+    return scale, side[0] - scale * first

@@ -14,13 +14,13 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from sgimd_torch.evaluation import RECENT
+from sgimd_torch.extras.report import figures, provenance
+from sgimd_torch.extras.table.results import results
+from sgimd_torch.extras.table.statistics import LEAST_SEEDS, Interval, interval_text
+from sgimd_torch.extras.table.variants import Variant, baseline_of, best_first, compare, read_runs, unit_of
 from sgimd_torch.files import check_writable, write_text
 from sgimd_torch.record import RunError
-from sgimd_torch.runs.signals import parser_of
-from sgimd_torch.views.report import figures, provenance
-from sgimd_torch.views.results import results
-from sgimd_torch.views.statistics import LEAST_SEEDS, Interval, interval_text
-from sgimd_torch.views.variants import Variant, baseline_of, best_first, compare, read_runs, unit_of
+from sgimd_torch.runs.program import parser_of
 
 EXAMPLES = """examples:
   sgimd report runs/sgim-d/seed-003               one run, into runs/sgim-d/seed-003/report.html
@@ -57,11 +57,11 @@ def parser() -> argparse.ArgumentParser:
     return parser
 
 
-def page(place: Path, variants: Sequence[Variant], baseline: str | None = None) -> str:
+def page(folder: Path, variants: Sequence[Variant], baseline: str | None = None) -> str:
     """The page as HTML: ``template.html.j2``, filled with figures and numbers of each variant; texts are escaped.
 
     Args:
-        place: folder of the runs.
+        folder: folder of the runs.
         variants: variants in the order of the page, at least one.
         baseline: name of the variant to compare the others with; None for the default of `baseline_of`.
 
@@ -71,8 +71,8 @@ def page(place: Path, variants: Sequence[Variant], baseline: str | None = None) 
     reference = baseline_of(variants, baseline)
     runs = [run for variant in variants for run in variant.runs]
     return rendered(
-        "template.html.j2",
-        place=place,
+        Path(__file__).with_name("template.html.j2"),
+        folder=folder,
         variants=variants,
         single=runs[0] if len(runs) == 1 else None,
         n_runs=len(runs),
@@ -90,13 +90,12 @@ def page(place: Path, variants: Sequence[Variant], baseline: str | None = None) 
     )
 
 
-def rendered(template: str, **values: Any) -> str:
-    """A template of this folder as HTML, filled with values; their texts are escaped."""
-    jinja = Environment(
-        loader=FileSystemLoader(Path(__file__).parent), autoescape=True, undefined=StrictUndefined, trim_blocks=True
-    )
+def rendered(template: Path, **values: Any) -> str:
+    """A template as HTML, filled with values; their texts are escaped. It may include parts from this folder."""
+    loader = FileSystemLoader([template.parent, Path(__file__).parent])
+    jinja = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     jinja.filters |= {"interval": _interval}
-    html = jinja.get_template(template).render(**values)
+    html = jinja.get_template(template.name).render(**values)
     return html.encode(errors="backslashreplace").decode()  # a name may hold invalid characters
 
 

@@ -1,5 +1,6 @@
 """The figures of a report: small images, readable at a width of 400 pixels.
 
+A `Variant` is all runs of one configuration, over seeds; a `Section` is a picture of T in the plane of two of its dimensions.
 source = curves(variants, colours_of(variants))    # a png as a data URL, for <img src=...>
 """
 
@@ -17,16 +18,15 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sgimd_torch.figures.axes import LEGEND, alike, curve_in_band, limits, over_movements
-from sgimd_torch.figures.learning import interest_map, landing_points
-from sgimd_torch.figures.learning import misses as draw_misses
-from sgimd_torch.figures.names import COLOURS
-from sgimd_torch.figures.save import STYLE as FILE_STYLE
-from sgimd_torch.figures.sections import Section, sections, sections_of_regions
+from sgimd_torch.extras.pictures.maps import misses as draw_misses
+from sgimd_torch.extras.pictures.sections import LEGEND, Section, alike, sections
+from sgimd_torch.extras.report.maps import curve_in_band, interest_map, landing_points, limits, over_movements
+from sgimd_torch.extras.report.save import STYLE as FILE_STYLE
+from sgimd_torch.extras.table.names import COLOURS
+from sgimd_torch.extras.table.statistics import interquartile_mean
+from sgimd_torch.extras.table.variants import Variant
 from sgimd_torch.runs.read import Run
 from sgimd_torch.spaces import Array, Box, rounded
-from sgimd_torch.views.statistics import interquartile_mean
-from sgimd_torch.views.variants import Variant
 
 P = ParamSpec("P")
 TILES: Final = 50  # largest number of tiles along the longer side of a map
@@ -181,6 +181,12 @@ def misses(figure: Figure, variant: Variant, *, expected: bool = False) -> None:
     most = max(float(np.nanquantile([errors, expected_errors], 0.95)), 1e-12)
     for ax, section in zip(_panels(figure, panels), panels, strict=True):
         draw_misses(ax, goals, drawn[0], variant.space, section, most, drawn[1])
+
+
+def sections_of_regions(lows: Array, highs: Array, space: Box, contexts: Box) -> list[Section]:
+    """The pictures of the part of T (``space``) that regions with corners ``(n, context_dim + outcome_dim)`` cover."""
+    low, high = lows.min(axis=0)[-space.dim :], highs.max(axis=0)[-space.dim :]
+    return sections(replace(space, low=low, high=high), contexts)
 
 
 def has_regions(run: Run) -> bool:

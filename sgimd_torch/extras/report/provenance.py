@@ -9,10 +9,10 @@ import shlex
 from collections.abc import Iterator, Sequence
 from typing import Final
 
+from sgimd_torch.extras.table.statistics import LEAST_SEEDS
+from sgimd_torch.extras.table.variants import Variant, differing, text_of, unalike
+from sgimd_torch.runs.messages import printable
 from sgimd_torch.runs.read import Run
-from sgimd_torch.runs.signals import printable
-from sgimd_torch.views.statistics import LEAST_SEEDS
-from sgimd_torch.views.variants import Variant, differing, text_of, unalike
 
 AGAIN: Final = "runs/again"  # folder for the repeated runs
 

@@ -3,7 +3,7 @@
 MAP-Elites (Mouret & Clune 2015), its line operator (Vassiliades & Mouret 2018), CMA-ME (Fontaine et al. 2020) and
 CMA-MAE (Fontaine & Nikolaidis 2023), by the package ``ribs``. Like goal babbling, these learners find a movement for
 each part of T that they reach. But they have no goals: they vary movements that had new outcomes.
-    learner = map_elites(environment, seed)        learner = cma_mae(environment, seed, correspondence=translate)
+    learner = map_elites_alone(environment, seed)        learner = cma_mae(environment, seed, correspondence=translate)
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from typing import Any, Final
 import numpy as np
 
 from sgimd_torch.algorithms import MakeInverse
+from sgimd_torch.calls import with_keywords_of
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Correspondence, Learner
 from sgimd_torch.memory import Memory
-from sgimd_torch.options.signature import with_keywords_of
 from sgimd_torch.parts import Problem, Social, Strategy
 from sgimd_torch.spaces import Array, Attempt, Demonstration, Move, check_count
 from sgimd_torch.strategies import Mimic, recording_outcomes
@@ -46,8 +46,8 @@ def quality_diversity(
     emitters: MakeEmitters,
     annealed: dict[str, Any],
     *,
+    correspondence: Correspondence | None,
     cells: int | None = None,
-    correspondence: Correspondence | None = None,
     imitations: int = 10,
     epsilon: float = 0.05,
     inverse: MakeInverse = LocalProcess,
@@ -98,6 +98,7 @@ def map_elites(
     environment: Environment,
     seed: int,
     *,
+    correspondence: Correspondence | None,
     first: int = 100,
     sd: float = 0.05,
     line: float = 0.0,
@@ -109,6 +110,7 @@ def map_elites(
     Args:
         environment: robot and world; nothing is executed here.
         seed: number from which the random stream of the learner comes.
+        correspondence: function from times and trajectory to theta_d, eq. (6); None: the learner has no teacher.
         first: number of uniform movements at the start.
         sd: standard deviation of the variations, as a fraction of each parameter's range in Pi.
         line: standard deviation of a step towards another elite, relative to the distance between the two elites; 0: no
@@ -137,7 +139,9 @@ def map_elites(
             return [IsoLineEmitter(archive, iso_sigma=sd, line_sigma=line, **shared)]
         return [GaussianEmitter(archive, sigma=sd, **shared)]
 
-    return quality_diversity(environment, seed, "isoline" if line else "map-elites", emitters, {}, **options)
+    return quality_diversity(
+        environment, seed, "isoline" if line else "map-elites", emitters, {}, correspondence=correspondence, **options
+    )
 
 
 isoline = partial(map_elites, sd=0.02, line=0.2)
@@ -149,6 +153,7 @@ def cma_me(
     environment: Environment,
     seed: int,
     *,
+    correspondence: Correspondence | None,
     emitters: int = 5,
     sd: float = 0.1,
     batch: int | None = None,
@@ -157,7 +162,7 @@ def cma_me(
     """CMA-ME with a teacher: CMA-ES towards new cells of the archive; restarts from an elite when it finds none.
 
     Args:
-        environment, seed, options: arguments of `map_elites`.
+        environment, seed, correspondence, options: arguments of `map_elites`.
         emitters: number of improvement emitters, which start at the centre of Pi. Deviation: Fontaine et al. have 15,
             but in a run on the rod each of the 15 would get only about 25 generations.
         sd: standard deviation at the start and after a restart, as a fraction of each parameter's range in Pi.
@@ -168,7 +173,7 @@ def cma_me(
         ValueError: see `map_elites`.
     """
     team = _team(environment, emitters, sd, batch, ranker="2imp")
-    return quality_diversity(environment, seed, "cma-me", team, {}, **options)
+    return quality_diversity(environment, seed, "cma-me", team, {}, correspondence=correspondence, **options)
 
 
 @with_keywords_of(quality_diversity)
@@ -176,6 +181,7 @@ def cma_mae(
     environment: Environment,
     seed: int,
     *,
+    correspondence: Correspondence | None,
     emitters: int = 5,
     sd: float = 0.1,
     batch: int | None = None,
@@ -185,7 +191,7 @@ def cma_mae(
     """CMA-MAE with a teacher: CMA-ME with thresholds that rise slowly, so that more movements are improvements.
 
     Args:
-        environment, seed, emitters, sd, batch, options: arguments of `cma_me`.
+        environment, seed, correspondence, emitters, sd, batch, options: arguments of `cma_me`.
         learning_rate: step of a cell's threshold towards the objective of a new movement, in (0, 1].
 
     Raises:
@@ -195,7 +201,7 @@ def cma_mae(
         raise ValueError(f"learning_rate must lie in (0, 1], got {learning_rate}; 1 is CMA-ME's archive")
     team = _team(environment, emitters, sd, batch, ranker="imp", selection_rule="mu", restart_rule="basic")
     annealed = {"learning_rate": learning_rate, "threshold_min": _LEAST_OBJECTIVE}
-    return quality_diversity(environment, seed, "cma-mae", team, annealed, **options)
+    return quality_diversity(environment, seed, "cma-mae", team, annealed, correspondence=correspondence, **options)
 
 
 _ALONE: Final[dict[str, Any]] = {"correspondence": None, "imitations": 0, "epsilon": 0.0}

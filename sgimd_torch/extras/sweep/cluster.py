@@ -18,9 +18,10 @@ from itertools import chain
 from pathlib import Path
 from typing import Final
 
-from sgimd_torch.runs.parallel import PATIENCE, POLL, Job, Machine, log_of, start_process
+from sgimd_torch.extras.sweep.parallel import PATIENCE, POLL, Job, Machine, log_of, start_process
+from sgimd_torch.runs.messages import say
+from sgimd_torch.runs.program import Failed
 from sgimd_torch.runs.read import movements_on_disk
-from sgimd_torch.runs.signals import Failed, say
 
 try:
     from distributed import CancelledError, Client, KilledWorker, Reschedule, Status, get_worker
@@ -43,7 +44,7 @@ class Cluster:
     """A Dask cluster, which is given all runs at once.
 
     Args:
-        place: address of the scheduler, or path of the file that ``dask scheduler --scheduler-file`` writes.
+        address: address of the scheduler, or path of the file that ``dask scheduler --scheduler-file`` writes.
 
     Raises:
         ValueError: no scheduler answers.
@@ -51,22 +52,24 @@ class Cluster:
 
     at_once = float("inf")
 
-    def __init__(self, place: str) -> None:
+    def __init__(self, address: str) -> None:
         for name in ("distributed", "distributed.client"):  # each has its own handler
             logging.getLogger(name).setLevel(logging.CRITICAL)
         try:
-            if not (is_file := Path(place).is_file()):
-                get_address_host_port(place)  # a client of an address without a port would wait for ever
-            found = {"scheduler_file" if is_file else "address": place}
+            if not (is_file := Path(address).is_file()):
+                get_address_host_port(address)  # a client of an address without a port would wait for ever
+            found = {"scheduler_file" if is_file else "address": address}
             self.client = Client(**found, timeout=CONNECT, set_as_default=False)
         except (OSError, ValueError) as error:
-            raise ValueError(f"no Dask scheduler answers at {place}; `dask scheduler` starts one ({error})") from error
-        say(f"{place} has {len(self.client.nthreads())} workers; more may join")
+            raise ValueError(
+                f"no Dask scheduler answers at {address}; `dask scheduler` starts one ({error})"
+            ) from error
+        say(f"{address} has {len(self.client.nthreads())} workers; more may join")
 
-    def start(self, job: Job) -> Task:
-        return Task(self.client, job)
+    def start(self, job: Job) -> ClusterJob:
+        return ClusterJob(self.client, job)
 
-    def stop(self, runs: Sequence[Task]) -> None:
+    def stop(self, runs: Sequence[ClusterJob]) -> None:
         keys, deadline = {run.future.key for run in runs}, time.monotonic() + PATIENCE
         if self.client.status == "running":
             self.client.cancel([run.future for run in runs])
@@ -76,7 +79,7 @@ class Cluster:
         self.client.close()
 
 
-class Task:
+class ClusterJob:
     """A run that the cluster was given."""
 
     def __init__(self, client: Client, job: Job) -> None:

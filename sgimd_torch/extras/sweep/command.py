@@ -28,13 +28,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
+from sgimd_torch.extras.sweep.parallel import Engine, Machine, sweep
 from sgimd_torch.files import make_folder
-from sgimd_torch.options.command_line import parse
 from sgimd_torch.options.config import Config, dashed
+from sgimd_torch.options.parse import parse
 from sgimd_torch.runs.directory import build_again, record_of
-from sgimd_torch.runs.parallel import Engine, Machine, sweep
+from sgimd_torch.runs.messages import say
+from sgimd_torch.runs.program import parser_of
 from sgimd_torch.runs.read import finished, movements_on_disk
-from sgimd_torch.runs.signals import loading, parser_of, say
+from sgimd_torch.runs.signals import loading
 
 MOST_SEEDS: Final = 100_000
 NOT_VARIED: Final = {
@@ -132,7 +134,7 @@ def engine_of(options: argparse.Namespace) -> Engine:
             "--processes cannot be given with --on: each worker of the cluster has its own number of threads"
         )
     with loading():
-        from sgimd_torch.runs.cluster import Cluster  # loaded only on request
+        from sgimd_torch.extras.sweep.cluster import Cluster  # loaded only on request
 
     return Cluster(options.on)
 

@@ -18,8 +18,10 @@ from pathlib import Path
 from typing import Any, Final, Protocol, TypeVar
 
 from sgimd_torch.files import make_folder
+from sgimd_torch.runs.messages import ProgressBar
+from sgimd_torch.runs.program import ONE_THREAD, Failed
 from sgimd_torch.runs.read import movements_on_disk
-from sgimd_torch.runs.signals import ONE_THREAD, Failed, Progress, Stopped, Stopping
+from sgimd_torch.runs.signals import Stopped, Stopping
 
 POLL: Final = 0.05  # s between two looks at the processes
 REFRESH: Final = 20  # looks at the processes between two looks at the movements on disk
@@ -107,7 +109,7 @@ def sweep(jobs: Sequence[J], engine: Engine, *, on_end: Callable[[J], None] | No
     done = {job: _on_disk(job) for job in jobs}
     failures: dict[J, str] = {}
     waiting, running = [*reversed(jobs)], dict[J, tuple[Any, int]]()
-    bar = Progress("sweep", sum(job.movements for job in jobs), sum(done.values()))
+    bar = ProgressBar("sweep", sum(job.movements for job in jobs), sum(done.values()))
     looks = count(1)
     with Stopping("stopping all runs; the same command continues them") as stopping, bar as progress:
         try:

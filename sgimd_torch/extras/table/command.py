@@ -27,13 +27,23 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
+from sgimd_torch.extras.table.results import Column, print_csv, print_table, results
+from sgimd_torch.extras.table.statistics import LEAST_SEEDS
+from sgimd_torch.extras.table.variants import (
+    Variant,
+    baseline_of,
+    best_first,
+    compare,
+    differing,
+    read_runs,
+    unalike,
+    unit_of,
+)
 from sgimd_torch.record import RunError
-from sgimd_torch.runs.directory import MAY_CHANGE
+from sgimd_torch.runs.directory import may_change
+from sgimd_torch.runs.messages import say
+from sgimd_torch.runs.program import parser_of
 from sgimd_torch.runs.read import Run
-from sgimd_torch.runs.signals import parser_of, say
-from sgimd_torch.views.results import Column, print_csv, print_table, results
-from sgimd_torch.views.statistics import LEAST_SEEDS
-from sgimd_torch.views.variants import Variant, baseline_of, best_first, compare, differing, read_runs, unalike, unit_of
 
 
 def parser() -> argparse.ArgumentParser:
@@ -85,7 +95,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if few := [f"{variant.name} ({len(variant.used or variant.runs)})" for variant in variants if variant.few]:
         say(f"fewer than {LEAST_SEEDS} seeds, too few for an interval: {', '.join(few)}")
     for variant in variants:
-        if others := [option for option in differing([variant]) if option not in MAY_CHANGE]:
+        if others := [option for option in differing([variant]) if option not in may_change()]:
             say(f"{variant.name}: its seeds differ in {', '.join(others)}; were two studies given one --name?")
     say(*(f"{run.path}: {remark}" for run in runs for remark in run.remarks))
     say(*(f"left out: {reason}" for reason in left_out))

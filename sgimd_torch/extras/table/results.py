@@ -17,9 +17,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from sgimd_torch.evaluation import RECENT
-from sgimd_torch.runs.signals import printable
-from sgimd_torch.views.statistics import Interval, interval_text, over_seeds
-from sgimd_torch.views.variants import EARLY, Variant, unit_of
+from sgimd_torch.extras.table.statistics import Interval, interval_text, over_seeds
+from sgimd_torch.extras.table.variants import EARLY, Variant, unit_of
+from sgimd_torch.runs.messages import printable
 
 MISSING: Final = "-"  # text of a number that is not known
 

@@ -19,31 +19,31 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from sgimd_torch.evaluation import RECENT, OwnGoals
-from sgimd_torch.figures.names import label
-from sgimd_torch.options.catalogue import unknown_name_error
-from sgimd_torch.runs.directory import NOT_COMPARED, RUN_FILE
+from sgimd_torch.extras.table.names import label
+from sgimd_torch.extras.table.statistics import LEAST_SEEDS, Interval, common_differences, over_seeds
+from sgimd_torch.runs.directory import RUN_FILE, not_compared
+from sgimd_torch.runs.messages import say
 from sgimd_torch.runs.read import Run, find_runs, read_run
-from sgimd_torch.runs.signals import say
 from sgimd_torch.spaces import Array
-from sgimd_torch.views.statistics import LEAST_SEEDS, Interval, common_differences, over_seeds
+from sgimd_torch.texts import unknown_name_error
 
 EARLY: Final = 1000  # number of movements after which tables show an early error
 POINTS: Final = 40  # largest number of points of a curve of own goals
 USUAL: Final = "sgim-d"  # name of the default baseline
 
 
-def read_runs(place: Path) -> dict[str, list[Run]]:
+def read_runs(folder: Path) -> dict[str, list[Run]]:
     """All runs below a folder, by name of the variant, without their thetas; folders without a run are reported.
 
     Raises:
         RunError: there are no runs, or one is damaged.
     """
     runs: dict[str, list[Run]] = {}
-    places = [(name, path) for name, paths in find_runs(place).items() for path in paths]
-    for folder in sorted([*place.glob("seed-*/"), *place.glob("*/seed-*/")]):
-        if not os.path.isfile(folder / RUN_FILE):
-            say(f"left out: {folder} has no {RUN_FILE} that can be read")
-    for name, path in tqdm(places, "reading", unit="", delay=1.0, disable=None):
+    found = [(name, path) for name, paths in find_runs(folder).items() for path in paths]
+    for below in sorted([*folder.glob("seed-*/"), *folder.glob("*/seed-*/")]):
+        if not os.path.isfile(below / RUN_FILE):
+            say(f"left out: {below} has no {RUN_FILE} that can be read")
+    for name, path in tqdm(found, "reading", unit="", delay=1.0, disable=None):
         run = replace(read_run(path), thetas=np.empty((0, 0)))  # thetas need much memory, and no view shows them
         runs.setdefault(name, []).append(run)
     return runs
@@ -77,7 +77,7 @@ def differing(variants: Sequence[Variant]) -> dict[str, list[str]]:
     values_of = {}
     for name in dict.fromkeys(name for variant in variants for run in variant.runs for name in run.config):
         values = [dict.fromkeys(text_of(run.config.get(name)) for run in variant.runs) for variant in variants]
-        if name not in NOT_COMPARED and len(set().union(*values)) > 1:
+        if name not in not_compared() and len(set().union(*values)) > 1:
             values_of[name] = [" or ".join(texts) for texts in values]
     return values_of
 

@@ -14,9 +14,9 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sgimd_torch.environments.models.places import joints_above
+from sgimd_torch.extras.models.places import joints_above
+from sgimd_torch.extras.teach.led import HandLed
 from sgimd_torch.spaces import Array, Box, check_point, read_only
-from sgimd_torch.teach.led import HandLed
 
 STEP: Final = 0.01  # s, time from one posture of the arm to the next
 FOLLOW: Final = 15.0  # 1/s, rate at which the held point follows the hand; 5 / FOLLOW s after a jump it is nearly there

@@ -1,7 +1,7 @@
-"""A map of T: the distance from each place to the nearest outcome that the learner remembers.
+"""A map of T: the distance from each point to the nearest outcome that the learner remembers.
 
     chart = chart_of(robot, memory, benchmark); colours = picture_of(chart, robot.outcomes)
-No movement is executed and no inverse model is asked (1 ms a place), so a map takes milliseconds.
+No movement is executed and no inverse model is asked (1 ms a point), so a map takes milliseconds.
 """
 
 from __future__ import annotations
@@ -47,15 +47,15 @@ def chart_of(robot: Environment, memory: Memory, benchmark: Benchmark) -> Chart:
         memory: memory of the learner; only read.
         benchmark: goals over which the distance is averaged, and the side of their tiles.
     """
-    places = np.concatenate([_cells(robot.outcomes), benchmark.goals])
+    points = np.concatenate([_cells(robot.outcomes), benchmark.goals])
     if len(memory):
         tree = KDTree(np.concatenate([memory.contexts, memory.outcomes], axis=1))
         context = robot.contexts.low + robot.contexts.sides / 2
-        queries = np.concatenate([np.tile(context, (len(places), 1)), places], axis=1)
+        queries = np.concatenate([np.tile(context, (len(points), 1)), points], axis=1)
         nearest = memory.outcomes[tree.query(queries)[1]]
     else:
-        nearest = np.tile(robot.rest, (len(places), 1))
-    of_cells, of_goals = np.split(np.linalg.norm(nearest - places, axis=1), [CELLS**2])
+        nearest = np.tile(robot.rest, (len(points), 1))
+    of_cells, of_goals = np.split(np.linalg.norm(nearest - points, axis=1), [CELLS**2])
     return Chart(of_cells.reshape(CELLS, CELLS), float(of_goals.mean()), of_goals <= benchmark.side / 2)
 
 

@@ -21,14 +21,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from sgimd_torch.options.command_line import parse
+from sgimd_torch.extras.teach.by_hand import BY_HAND
 from sgimd_torch.options.config import Config
+from sgimd_torch.options.parse import parse
 from sgimd_torch.record import ReplayError
 from sgimd_torch.runs.directory import with_found_earlier
+from sgimd_torch.runs.messages import say
+from sgimd_torch.runs.program import Failed, parser_of
 from sgimd_torch.runs.read import config_of, read_run
-from sgimd_torch.runs.signals import Failed, loading, parser_of, say
+from sgimd_torch.runs.signals import loading
 from sgimd_torch.session import NoOutcomeError
-from sgimd_torch.teach.by_hand import BY_HAND
 
 if TYPE_CHECKING:
     from viser import ViserServer
@@ -50,8 +52,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     config, port = options_of(sys.argv[1:] if argv is None else argv)
     token = secrets.token_urlsafe(16)
     with loading():
-        from sgimd_torch.teach.page import Page
-        from sgimd_torch.teach.taught import TaughtRun
+        from sgimd_torch.extras.teach.page import Page
+        from sgimd_torch.extras.teach.taught import TaughtRun
     taught = TaughtRun(config)
     with serving(port, token) as server:
         page = Page(server, taught)
@@ -75,7 +77,7 @@ def serving(port: int, token: str) -> Iterator[ViserServer]:
     """
     import viser  # slow to load, and an optional dependency
 
-    from sgimd_torch.teach.guard import guarded
+    from sgimd_torch.extras.teach.guard import guarded
 
     with contextlib.redirect_stdout(io.StringIO()), guarded(token):  # viser prints a banner
         server = viser.ViserServer(host="127.0.0.1", port=port, verbose=False)

@@ -13,9 +13,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from sgimd_torch.extras.teach.arm import STEP, Arm, Grip
+from sgimd_torch.extras.teach.led import HandLed
 from sgimd_torch.spaces import Array, check_point
-from sgimd_torch.teach.arm import STEP, Arm, Grip
-from sgimd_torch.teach.led import HandLed
 
 
 class Leading:

@@ -14,11 +14,11 @@ import numpy as np
 
 from sgimd_torch.environments.fishing_rod import JOINT_RANGES, JOINTS, FishingRod
 from sgimd_torch.environments.motor_primitives import GaussianPrimitive
-from sgimd_torch.environments.mujoco_robot import MujocoRobot
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.runs.tasks import Task
-from sgimd_torch.runs.tasks.taught import correspondence_of
+from sgimd_torch.extras.models.mujoco_robot import MujocoRobot
 from sgimd_torch.spaces import Array, Box
+from sgimd_torch.tasks import Task
+from sgimd_torch.tasks.taught import correspondence_of
 
 
 def on_the_plane(points: Array) -> Array:
@@ -43,7 +43,7 @@ class HandLed:
         positions: ``(nq,)`` positions of all joints at the start of movements, except for the led ones; None for the
             initial positions of the model.
         hidden: names of bodies that are not drawn.
-        place: function from points of T ``(n, outcome_dim)`` to positions in the world ``(n, 3)`` m.
+        located: function from points of T ``(n, outcome_dim)`` to positions in the world ``(n, 3)`` m.
     """
 
     model: mujoco.MjModel
@@ -55,7 +55,7 @@ class HandLed:
     accelerations: Array | None = None
     positions: Array | None = None
     hidden: tuple[str, ...] = ()
-    place: Callable[[Array], Array] = on_the_plane
+    located: Callable[[Array], Array] = on_the_plane
 
 
 def hand_led_of(task: Task) -> HandLed:
@@ -79,12 +79,12 @@ def hand_led_of(task: Task) -> HandLed:
             *(robot.model, robot.joints, robot.hand, robot.primitive.joints, robot.start),
             *robot.primitive.fastest(),
             positions=robot.positions(start),
-            place=(lambda points: robot.located(points, start)[:, 0]) if measured else on_the_plane,
+            located=(lambda points: robot.located(points, start)[:, 0]) if measured else on_the_plane,
         )
     else:
         raise ValueError(
             f"{type(robot).__name__} cannot be led by the hand: it does not say which joints of which model a hand "
-            "moves; give it an attribute hand_led, a HandLed(model, joints, hand) of sgimd_torch.teach.led"
+            "moves; give it an attribute hand_led, a HandLed(model, joints, hand) of sgimd_torch.extras.teach.led"
         )
     correspondence_of(task)
     return led

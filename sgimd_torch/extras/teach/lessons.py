@@ -14,12 +14,13 @@ from typing import Final
 
 import numpy as np
 
-from sgimd_torch.demonstrations.fit import beyond_limits, misfit_of
+from sgimd_torch.demonstrations.fit import misfit_of
 from sgimd_torch.environments.protocol import execute_one, primitive_of
-from sgimd_torch.runs.tasks import Task
-from sgimd_torch.runs.tasks.taught import correspondence_of
+from sgimd_torch.extras.recordings.limits import beyond_limits
+from sgimd_torch.extras.teach.led import HandLed, hand_led_of
 from sgimd_torch.spaces import Array, Demonstration, read_only
-from sgimd_torch.teach.led import HandLed, hand_led_of
+from sgimd_torch.tasks import Task
+from sgimd_torch.tasks.taught import correspondence_of
 
 FASTER: Final = 1.02  # multiple of the robot's largest speed; a joint that was led faster gets a remark
 AWAY: Final = 0.05  # rad; a recording that starts farther from the start of movements gets a remark

@@ -17,13 +17,13 @@ from typing import Any, Final
 import numpy as np
 import viser
 
-from sgimd_torch.demonstrations.units import moving
+from sgimd_torch.extras.recordings.units import moving
+from sgimd_torch.extras.teach.leading import Leading
+from sgimd_torch.extras.teach.lessons import HandLesson
+from sgimd_torch.extras.teach.panel import Panel
+from sgimd_torch.extras.teach.scene import Scene
+from sgimd_torch.extras.teach.taught import Status, TaughtRun
 from sgimd_torch.spaces import Array
-from sgimd_torch.teach.leading import Leading
-from sgimd_torch.teach.lessons import HandLesson
-from sgimd_torch.teach.panel import Panel
-from sgimd_torch.teach.scene import Scene
-from sgimd_torch.teach.taught import Status, TaughtRun
 
 TICK: Final = 1 / 30  # s, time from one picture to the next
 BLOCK: Final = 10  # number of movements of the learner between two updates of the page

@@ -12,10 +12,10 @@ from typing import Any, Final
 import numpy as np
 import viser
 
+from sgimd_torch.extras.teach.chart import COLOURS, Chart
+from sgimd_torch.extras.teach.lessons import HandLesson
+from sgimd_torch.extras.teach.taught import Status
 from sgimd_torch.spaces import Box
-from sgimd_torch.teach.chart import COLOURS, Chart
-from sgimd_torch.teach.lessons import HandLesson
-from sgimd_torch.teach.taught import Status
 
 Act = Callable[[str, viser.ClientHandle], None]
 ICON: Final = viser.Icon
@@ -109,8 +109,8 @@ class Panel:
         if lesson is None:
             self.lesson.content = f"**This is no lesson:** {problem}" if problem else NOTHING_RECORDED
             return
-        place = ", ".join(f"{x:.2f}" for x in lesson.demonstration.outcome)
-        words = f"Its outcome is **({place}) {self._space.unit}**, the orange ring."
+        point = ", ".join(f"{x:.2f}" for x in lesson.demonstration.outcome)
+        words = f"Its outcome is **({point}) {self._space.unit}**, the orange ring."
         if np.isfinite(lesson.misfit):
             words += f" The robot repeats your movement to **{lesson.misfit:.3f} rad** (root mean square)."
         remarks = lesson.remarks or ["the robot can follow everything"]

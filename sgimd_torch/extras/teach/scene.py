@@ -14,10 +14,10 @@ import trimesh
 import viser
 from viser.transforms import SO3
 
+from sgimd_torch.extras.teach.arm import Arm
+from sgimd_torch.extras.teach.chart import CELLS, COLOURS, Chart, picture_of
+from sgimd_torch.extras.teach.led import HandLed
 from sgimd_torch.spaces import Array, Box, rounded
-from sgimd_torch.teach.arm import Arm
-from sgimd_torch.teach.chart import CELLS, COLOURS, Chart, picture_of
-from sgimd_torch.teach.led import HandLed
 
 HAND: Final = (240, 120, 30)  # colour of the robot's hand and of the lesson's outcome
 LEARNER: Final = (60, 70, 190)  # colour of the learner's latest outcomes
@@ -104,11 +104,11 @@ class Scene:
         if len(outcomes):
             self._latest.points = self.ground(outcomes, 5).astype(np.float16)
 
-    def mark(self, place: Array | None) -> None:
-        """Draw the ring of a lesson at a ``place`` ``(outcome_dim,)`` of T; None hides it."""
-        self._mark.visible = place is not None
-        if place is not None:
-            self._mark.position = self.ground(place, 3)
+    def mark(self, point: Array | None) -> None:
+        """Draw the ring of a lesson at a ``point`` ``(outcome_dim,)`` of T; None hides it."""
+        self._mark.visible = point is not None
+        if point is not None:
+            self._mark.position = self.ground(point, 3)
 
     def _points(self, name: str, points: Array, colour: tuple[int, int, int], size: float) -> Any:
         return self._scene.add_point_cloud(
@@ -123,7 +123,7 @@ class Scene:
     def _placed(self, points: Array) -> Array:
         """Positions ``(..., 3)`` m in the world of points ``(..., outcome_dim)`` of T."""
         rows = np.reshape(points, (-1, self._outcomes.dim))
-        return self._led.place(rows).reshape(*np.shape(points)[:-1], 3)
+        return self._led.located(rows).reshape(*np.shape(points)[:-1], 3)
 
     def _add_map(self, origin: Array, along: Array, across: Array, edges: Array) -> None:
         """Add the map, with numbers and names at the ``edges`` of T that begin at ``origin`` and have a direction."""
@@ -142,15 +142,15 @@ class Scene:
             beside = origin + 0.04 * self.size * outwards
             step = rounded((high - low) / NUMBERS)
             for value in step * np.arange(np.ceil(low / step), np.floor(high / step) + 1):
-                place = beside + (value - low) / (high - low) * edge
-                self._label(f"/axes/{k}/{value:g}", f"{value + 0.0:g}", place)
+                position = beside + (value - low) / (high - low) * edge
+                self._label(f"/axes/{k}/{value:g}", f"{value + 0.0:g}", position)
             self._label(f"/axes/{k}/name", self._outcomes.axis(k), beside + edge / 2 + 0.06 * self.size * outwards)
             self._scene.add_line_segments(
                 f"/axes/{k}/line", np.stack([origin, origin + edge])[None], TOO_FAR, thickness=0.003 * self.size
             )
 
-    def _label(self, name: str, text: str, place: Array) -> None:
-        self._scene.add_label(name, text, position=place, anchor="center-center", font_screen_scale=0.8)
+    def _label(self, name: str, text: str, position: Array) -> None:
+        self._scene.add_label(name, text, position=position, anchor="center-center", font_screen_scale=0.8)
 
 
 def _is_visible(model: Any, k: int) -> bool:

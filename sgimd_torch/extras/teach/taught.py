@@ -6,21 +6,18 @@ Only one thread at a time may use a `TaughtRun`. ``sgimd run --resume`` can cont
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Final
 
-import numpy as np
-
+from sgimd_torch.extras.teach.by_hand import BY_HAND, ByHand
+from sgimd_torch.extras.teach.chart import Chart, chart_of
+from sgimd_torch.extras.teach.led import hand_led_of
+from sgimd_torch.extras.teach.lessons import HandLesson, lesson_by_hand
 from sgimd_torch.options.config import Config
 from sgimd_torch.runs.directory import build_again, record_of
 from sgimd_torch.runs.run import RunLoop
 from sgimd_torch.spaces import Array, Demonstration, stream
-from sgimd_torch.teach.by_hand import BY_HAND, ByHand
-from sgimd_torch.teach.chart import Chart, chart_of
-from sgimd_torch.teach.led import hand_led_of
-from sgimd_torch.teach.lessons import HandLesson, lesson_by_hand
 
 LATEST: Final = 60  # number of latest outcomes that the page draws
 IMITATIONS: Final = 10  # largest number of movements that imitate a lesson at once
@@ -78,7 +75,6 @@ class TaughtRun:
         self._loop = RunLoop(self.parts, resume=record is not None)
         self._episodes = self._loop.episodes()
         self._lessons = sum(event.kind == "shown" and event.who == BY_HAND for event in self._loop.record.events())
-        self._outcomes: deque[Array] = deque(maxlen=LATEST)
 
     def go_on(self, movements: int, *, until_idle: bool = False) -> Status:
         """Let the learner make further movements, or replay recorded ones.
@@ -90,9 +86,7 @@ class TaughtRun:
         Raises:
             SimulationError, ReplayError, ValueError, OSError: as ``sgimd run``.
         """
-        for episode in islice(self._episodes, movements):
-            if episode.outcome is not None:
-                self._outcomes.append(episode.outcome)
+        for _ in islice(self._episodes, movements):
             if until_idle and self.parts.learner.idle:
                 break
         if not self._loop.replaying:
@@ -131,9 +125,8 @@ class TaughtRun:
     def status(self) -> Status:
         """The present status."""
         robot, memory = self.parts.environment, self.parts.learner.memory
-        outcomes = np.array(self._outcomes).reshape(-1, robot.outcomes.dim)
         chart = chart_of(robot, memory, self.parts.benchmark)
-        return Status(self._loop.movements, self._lessons, self._loop.replaying, outcomes, chart)
+        return Status(self._loop.movements, self._lessons, self._loop.replaying, memory.outcomes[-LATEST:], chart)
 
     def close(self) -> None:
         """Write the rest of the record, and release the directory for other processes."""

@@ -11,9 +11,9 @@ import pytest
 
 from sgimd_torch import FishingRod, load_learner, practice, run
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.options.command_line import main as run_main
-from sgimd_torch.runs.signals import command
-from sgimd_torch.views.ask import DISTANCES, main
+from sgimd_torch.extras.ask.command import DISTANCES, main
+from sgimd_torch.runs.command import main as run_main
+from sgimd_torch.runs.program import command
 
 SHORT = ["--environment=planar-arm-7", "--algorithm=practice", "--seed=4", "--movements=80", "--evaluate-at=[]"]
 

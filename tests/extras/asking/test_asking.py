@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from experiments.mislabelling import mislabelled
-from sgimd_torch.asking.algorithms import SEARCHING, sgim_acts, sgim_im
-from sgimd_torch.asking.teachers import AnsweringTeacher, high_half, low_half
 from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.extras.asking.algorithms import SEARCHING, sgim_acts, sgim_im
+from sgimd_torch.extras.asking.teachers import AnsweringTeacher, high_half, low_half
 from sgimd_torch.goals.uniform import UniformGoals
 from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.parts import Demonstrator, Strategy
-from sgimd_torch.runs.tasks.robots import arm_demonstrations
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Demonstration, Lesson, Request, stream
+from sgimd_torch.tasks.robots import arm_demonstrations
 from worlds import NO_CONTEXT, demonstrations, last_posture
 
 ARM = PlanarArm(4, noise=0.02)

@@ -6,13 +6,13 @@ import signal
 import pytest
 
 from runs import LIVE, end, stopped
-from sgimd_torch.options.command_line import main
+from sgimd_torch.runs.command import main
+from sgimd_torch.runs.program import command
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.runs.signals import command
 
 STUCK = '''
 import os, signal, threading
-from sgimd_torch.asking.teachers import AnsweringTeacher
+from sgimd_torch.extras.asking.teachers import AnsweringTeacher
 
 class Busy(AnsweringTeacher):
     """Notes every request; from the fourth one on it is too busy, unless there is a file "awake"."""

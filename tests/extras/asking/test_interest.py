@@ -5,7 +5,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from sgimd_torch.asking.interest import StrategicInterest, between_means, progresses, strategic_progress
+from sgimd_torch.extras.asking.interest import StrategicInterest, between_means, progresses, strategic_progress
 from sgimd_torch.spaces import Box, stream
 from worlds import NO_CONTEXT, problem
 

@@ -12,9 +12,9 @@ import pytest
 
 from runs import LIVE, content_of, start
 from sgimd_torch import session
+from sgimd_torch.extras.at_once.processes import in_processes
 from sgimd_torch.options.catalogue import load_word
 from sgimd_torch.record import Record
-from sgimd_torch.runs.at_once import in_processes
 from sgimd_torch.runs.directory import RUN_FILE
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.session import live
@@ -86,7 +86,8 @@ RUN = ["--algorithm", "practice", "--at-once", "4", "--environment"]
 
 
 @pytest.mark.parametrize(
-    ("robot", "at_once"), [("planar-arm-7", 4), ("experiments.toys:toss", 2), ("robots_at_once:Odd", 2)]
+    ("robot", "at_once"),
+    [("planar-arm-7", 4), ("robots_at_once:Odd", 2), pytest.param("experiments.toys:toss", 2, marks=pytest.mark.slow)],
 )
 def test_a_run_that_was_stopped_goes_on_to_the_rows_of_a_whole_one(
     go, own, tmp_path, robot, at_once, capfd, monkeypatch
@@ -104,8 +105,8 @@ def test_a_run_that_was_stopped_goes_on_to_the_rows_of_a_whole_one(
     found = read_run(tmp_path / "whole" / place)
     assert found.summary["movements"] == 98
     with Record(tmp_path / "whole" / place / RUN_FILE) as record:
-        places = [event.place for event in record.events()]
-    sizes = [here + 1 for here, after in pairwise([*places, 0]) if after == 0]
+        robots = [event.robot for event in record.events()]
+    sizes = [here + 1 for here, after in pairwise([*robots, 0]) if after == 0]
     assert sizes[:20] == [1] * 20
     assert set(sizes[20:]) == {*range(2, at_once + 1)}
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from sgimd_torch.evaluation import SIDES, load_benchmark, tile_side
-from sgimd_torch.options.command_line import main as live
+from sgimd_torch.extras.benchmark.command import main
+from sgimd_torch.runs.command import main as live
+from sgimd_torch.runs.program import command
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.runs.signals import command
 from sgimd_torch.spaces import Box, stream
-from sgimd_torch.views.benchmark import main
 
 
 def run(*options, movements=300, algorithm="random"):

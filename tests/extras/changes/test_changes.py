@@ -8,10 +8,10 @@ import pytest
 from changing import Changing
 from sgimd_torch.algorithms.paper import sagg_riac, sgim_d
 from sgimd_torch.algorithms.practice import practice
-from sgimd_torch.changes.calibration import Calibration
-from sgimd_torch.changes.eras import Era, Exemplars
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import evaluate
+from sgimd_torch.extras.changes.calibration import Calibration
+from sgimd_torch.extras.changes.eras import Era, Exemplars
 from sgimd_torch.forward_model.search import GradientSearch
 from sgimd_torch.inverses.local import LocalInverse
 from sgimd_torch.inverses.local_process import LocalProcess

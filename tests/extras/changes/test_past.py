@@ -8,13 +8,14 @@ import pytest
 from runs import content_of, edit, write_about
 from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.options.command_line import main, parse
+from sgimd_torch.options.parse import parse
 from sgimd_torch.record import RunError
 from sgimd_torch.record.replay import save_life
+from sgimd_torch.runs.command import main
 from sgimd_torch.runs.directory import RUN_FILE
 from sgimd_torch.runs.load import load_learner
+from sgimd_torch.runs.program import command
 from sgimd_torch.runs.read import finished, read_run
-from sgimd_torch.runs.signals import command
 
 SHORT = ["--environment", "planar-arm-7", "--repeats", "0", "--evaluate-at", "[]"]
 

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from sgimd_torch.__main__ import _call
-from sgimd_torch.environments.check import check_environment
+from sgimd_torch.environments.fishing_rod import FishingRod
+from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.protocol import check_movement
-from sgimd_torch.runs.signals import command
+from sgimd_torch.extras.check.promises import check_environment
+from sgimd_torch.runs.program import command
 from sgimd_torch.spaces import Box, stream
 
 
@@ -183,7 +185,7 @@ MODULE = """
 import numpy as np
 from sgimd_torch import Box, PlanarArm
 from sgimd_torch.evaluation import Benchmark
-from sgimd_torch.runs.tasks import Task
+from sgimd_torch.tasks import Task
 
 class Far(PlanarArm):
     rest = property(lambda self: np.array([9.0, 0.0]), lambda self, value: None)
@@ -252,3 +254,31 @@ def test_the_command_refuses_with_exit_code_2_and_no_traceback(arms, capsys, wor
     said = capsys.readouterr().err
     assert told in said
     assert "Traceback" not in said
+
+
+ROBOTS = {
+    "arm": PlanarArm(),
+    "two joints": PlanarArm(2),
+    "noise and context": PlanarArm(noise=0.02, context=True),
+    "large task space": PlanarArm(context=True, outcomes=Box.cube(-100, 100, 2)),
+    "rod": FishingRod(),
+    "windy rod": FishingRod(max_wind=0.02),
+}
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_our_robots_keep_every_promise(name):
+    check_environment(ROBOTS[name])
+
+
+class Hiding(Cannon):
+    """Its batches hide some outcomes."""
+
+    def execute_many(self, contexts, thetas, rngs):
+        outcomes = super().execute_many(contexts, thetas, rngs)
+        return np.ma.masked_array(outcomes, outcomes > 0)
+
+
+def test_a_mask_that_hides_outcomes_is_told():
+    with pytest.raises(ValueError, match="got MaskedArray; raise SimulationError where there is no outcome"):
+        check_environment(Hiding())

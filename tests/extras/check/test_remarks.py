@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from sgimd_torch.__main__ import _call
-from sgimd_torch.environments.remarks import remarks_on
-from sgimd_torch.runs.signals import command
+from sgimd_torch.extras.check.remarks import remarks_on
+from sgimd_torch.runs.program import command
 from sgimd_torch.spaces import Box, stream
 from worlds import Boxes
 

@@ -7,10 +7,10 @@ import numpy as np
 
 from runs import content_of, start
 from sgimd_torch.evaluation import Benchmark, save_benchmark
+from sgimd_torch.extras.demo.command import configs_of, main
 from sgimd_torch.options.catalogue import WORDS
+from sgimd_torch.runs.program import command
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.runs.signals import command
-from sgimd_torch.views.demo import configs_of, main
 
 LEARNERS = ("random", "sgim-d", "practice-taught")
 DEMO = "import sys; from sgimd_torch.__main__ import main; sys.argv.insert(1, 'demo'); sys.exit(main())"

@@ -12,18 +12,18 @@ from imageio_ffmpeg import get_ffmpeg_exe
 from PIL import Image, ImageSequence
 
 from runs import ROOT
+from sgimd_torch import Sketch
 from sgimd_torch.environments.fishing_rod import HOLD, FishingRod
-from sgimd_torch.environments.mujoco_robot import MujocoRobot
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.environments.sketch import Sketch
-from sgimd_torch.options import command_line
-from sgimd_torch.runs.signals import command
+from sgimd_torch.extras.check import command as check
+from sgimd_torch.extras.film import command as film
+from sgimd_torch.extras.film.model_camera import viewing
+from sgimd_torch.extras.film.reel import PAUSE, RATES, Shot, write_film
+from sgimd_torch.extras.film.sketch import Sketchbook, panel
+from sgimd_torch.extras.models.mujoco_robot import MujocoRobot
+from sgimd_torch.runs import command as run_command
+from sgimd_torch.runs.program import command
 from sgimd_torch.spaces import Box, stream
-from sgimd_torch.views import check
-from sgimd_torch.views.film import command as film
-from sgimd_torch.views.film.model_camera import viewing
-from sgimd_torch.views.film.reel import PAUSE, RATES, Shot, write_film
-from sgimd_torch.views.film.sketch import Sketchbook, panel
 
 THETAS = stream(0, "film").random((100, 25))[40:]  # some reach the water before the line is let out
 RATE = RATES[".mp4"]
@@ -183,8 +183,8 @@ from dataclasses import replace
 import numpy as np
 from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.spaces import stream
-from sgimd_torch.views.film.camera import Camera
-from sgimd_torch.views.film.reel import Shot
+from sgimd_torch.extras.film.camera import Camera
+from sgimd_torch.extras.film.reel import Shot
 
 rod = FishingRod(noise=0.0, threads=1)
 moved = rod.trace([], stream(0, "film").random(25), stream(1, "noise"))
@@ -229,7 +229,7 @@ ARM = "--environment planar-arm-7 --algorithm sagg-riac --movements 60 --evaluat
 
 
 def live(words):
-    assert command(command_line.main, words.split()) == 0
+    assert command(run_command.main, words.split()) == 0
 
 
 def test_a_recorded_movement_of_an_arm_ends_where_the_executed_one_does():
@@ -293,10 +293,10 @@ def test_a_robot_from_a_file_is_filmed_in_space_and_without_opengl_in_the_plane(
 CONTRAST = """
 import sys
 import numpy as np
-from sgimd_torch.environments.mujoco_robot import MujocoRobot
+from sgimd_torch.extras.models.mujoco_robot import MujocoRobot
 from sgimd_torch.spaces import stream
-from sgimd_torch.views.film.model_camera import ModelCamera
-from sgimd_torch.views.film.reel import Shot
+from sgimd_torch.extras.film.model_camera import ModelCamera
+from sgimd_torch.extras.film.reel import Shot
 
 for path in sys.argv[1:]:
     robot = MujocoRobot(path, outcome="site:tip:xy", low=(-0.4, -0.4), high=(0.4, 0.4))
@@ -314,6 +314,7 @@ ARM_OF_GREY = """<mujoco><worldbody>{}<body><joint name='turn' axis='0 0 1' rang
   <actuator><position joint='turn' kp='20' kv='4'/></actuator></mujoco>"""
 
 
+@pytest.mark.slow
 def test_an_arm_of_any_brightness_stands_out_from_what_is_behind_it(tmp_path):
     paths, plane, light = [], "<geom type='plane' size='.1 .1 .1'/>", "<light pos='0 0 2'/>"
     for grey, around in itertools.product((0.05, 0.6, 1.0), ("", plane, light)):

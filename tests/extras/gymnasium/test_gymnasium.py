@@ -5,14 +5,14 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from sgimd_torch.environments.check import check_environment
-from sgimd_torch.environments.controllers import Sinusoids
-from sgimd_torch.environments.from_gymnasium import FromGymnasium, measured_noise
 from sgimd_torch.environments.motor_primitives import GaussianPrimitive
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.protocol import SimulationError
-from sgimd_torch.environments.remarks import remarks_on
-from sgimd_torch.environments.to_gymnasium import ToGymnasium
+from sgimd_torch.extras.check.promises import check_environment
+from sgimd_torch.extras.check.remarks import remarks_on
+from sgimd_torch.extras.gymnasium.controllers import Sinusoids
+from sgimd_torch.extras.gymnasium.from_gymnasium import FromGymnasium, measured_noise
+from sgimd_torch.extras.gymnasium.to_gymnasium import ToGymnasium
 from sgimd_torch.spaces import Box, stream
 
 PUSHES = Box.cube(-1, 1, 2)

@@ -14,11 +14,11 @@ from arms import interrupt, on_table, write
 from sgimd_torch import MujocoRobot, SimulationError, stream
 from sgimd_torch.__main__ import _call
 from sgimd_torch.demonstrations import load_demonstrations
-from sgimd_torch.environments.lerobot import LeRobotArm
 from sgimd_torch.environments.protocol import check_robot
+from sgimd_torch.extras.lerobot.arm import LeRobotArm
 from sgimd_torch.runs.directory import code_of
+from sgimd_torch.runs.program import command
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.runs.signals import command
 
 NONE, RNG = np.zeros(0), stream(0, "arm")
 FAR = np.append(np.repeat([1.0, 0.8, 0.6], 4), 0.0)  # a theta that bends all joints at once

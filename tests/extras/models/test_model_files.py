@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from sgimd_torch import MujocoRobot, check_environment, stream
-from sgimd_torch.environments.models.posture import NEAR, nearest_posture
-from sgimd_torch.runs.tasks import Task, benchmark_of
-from sgimd_torch.runs.tasks.goals import goals_all_over, goals_within_reach
+from sgimd_torch.extras.models.posture import NEAR, nearest_posture
+from sgimd_torch.tasks import Task, benchmark_of
+from sgimd_torch.tasks.goals import goals_all_over, goals_within_reach
 from urdf import URDF
 
 # Two links of .3 m under gravity, with motors; the second one begins outside its range, and carries a pole that swings.

@@ -10,18 +10,19 @@ import pytest
 
 from runs import about_of
 from sgimd_torch import MujocoRobot, SimulationError, check_environment, stream
-from sgimd_torch.demonstrations.units import moving
-from sgimd_torch.environments.controllers import Sinusoids
-from sgimd_torch.options.build import build
-from sgimd_torch.options.command_line import main, parse
+from sgimd_torch.extras.check.command import main as check
+from sgimd_torch.extras.gymnasium.controllers import Sinusoids
+from sgimd_torch.extras.recordings.units import moving
+from sgimd_torch.extras.teach.leading import Leading
+from sgimd_torch.extras.teach.led import hand_led_of
+from sgimd_torch.extras.teach.lessons import lesson_by_hand
 from sgimd_torch.options.config import Config
+from sgimd_torch.options.parse import parse
+from sgimd_torch.runs.build import build
+from sgimd_torch.runs.command import main
+from sgimd_torch.runs.program import command
 from sgimd_torch.runs.read import config_of, finished, read_run
-from sgimd_torch.runs.signals import command
-from sgimd_torch.runs.tasks import Task
-from sgimd_torch.teach.leading import Leading
-from sgimd_torch.teach.led import hand_led_of
-from sgimd_torch.teach.lessons import lesson_by_hand
-from sgimd_torch.views.check import main as check
+from sgimd_torch.tasks import Task
 from urdf import URDF
 
 # An arm of two links of .3 m in the plane z = .05, a puck of radius .04 beside it, and a door.
@@ -227,6 +228,7 @@ def test_what_was_found_is_given_to_the_next_robot_which_makes_no_movement(here,
     assert second.remarks == []
 
 
+@pytest.mark.slow
 def test_a_run_needs_no_code_keeps_what_was_found_and_tells_which_file_of_the_model_has_changed(
     here, capsys, monkeypatch
 ):

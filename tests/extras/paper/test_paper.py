@@ -13,15 +13,16 @@ from PIL import Image
 
 from pages import Page, alts, drawn, rows_of
 from runs import write_about
-from sgimd_torch.figures.names import COLOURS
-from sgimd_torch.options.command_line import main as live
+from sgimd_torch.extras.paper import command as paper
+from sgimd_torch.extras.paper import figures as paper_figures
+from sgimd_torch.extras.paper.replication import Replication
+from sgimd_torch.extras.table.names import COLOURS
+from sgimd_torch.extras.table.variants import Variant
 from sgimd_torch.options.config import words
+from sgimd_torch.runs.command import main as live
+from sgimd_torch.runs.program import command
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.runs.signals import command
 from sgimd_torch.spaces import Box
-from sgimd_torch.views.report import paper, paper_figures
-from sgimd_torch.views.report.replication import Replication
-from sgimd_torch.views.variants import Variant
 
 FIGURES = [
     *("Error curves of the five learners", "Error curves by demonstrator"),
@@ -106,7 +107,7 @@ def test_a_large_t_of_the_page_is_no_warning_and_other_remarks_are(tiny, tmp_pat
     out = shutil.copytree(tiny[0], tmp_path / "paper")
     plan = {name: replace(config, out=out) for name, config in tiny[2].items()}
     for name in ("random", "sgim-d-large"):
-        write_about(plan[name].directory, remarks={"narrow": f"{name} is told"})
+        write_about(plan[name].directory, remarks={"outcomes": {"narrow": f"{name} is told"}})
     told = Page(paper.page(plan, [0])).all("li")
     assert [text.rpartition(": ")[2] for text in told if text.endswith("told.")] == ["random is told."]
 

@@ -7,9 +7,9 @@ from experiments.toys import puck
 from finger import Finger
 from sgimd_torch.algorithms.paper import random_exploration
 from sgimd_torch.algorithms.practice import practice
-from sgimd_torch.changes.carried_over import error_knowing_previous
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.environments.previous import with_previous
+from sgimd_torch.extras.previous.carried_over import error_knowing_previous
+from sgimd_torch.extras.previous.with_previous import with_previous
 from sgimd_torch.session import run
 from worlds import ArmThat
 

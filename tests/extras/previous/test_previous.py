@@ -6,10 +6,10 @@ import pytest
 from finger import Finger
 from sgimd_torch.algorithms.paper import random_exploration
 from sgimd_torch.algorithms.practice import practice
-from sgimd_torch.environments.check import check_environment
-from sgimd_torch.environments.previous import with_previous
 from sgimd_torch.environments.protocol import SimulationError
 from sgimd_torch.evaluation import evaluate, tile_goals, tile_side
+from sgimd_torch.extras.check.promises import check_environment
+from sgimd_torch.extras.previous.with_previous import with_previous
 from sgimd_torch.session import run
 from sgimd_torch.spaces import stream
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from sgimd_torch.options.command_line import main
+from sgimd_torch.extras.ask import command as ask
+from sgimd_torch.runs.command import main
 from sgimd_torch.runs.load import load_learner
+from sgimd_torch.runs.program import command
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.runs.signals import command
-from sgimd_torch.views import ask
 
 SAID = "outcomes depend on the movement before"
 

@@ -13,15 +13,15 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from pages import Page, alts, drawn, rows_of
-from sgimd_torch.figures.names import COLOURS
-from sgimd_torch.options.command_line import parse
+from sgimd_torch.extras.report import command as report
+from sgimd_torch.extras.report import figures, provenance
+from sgimd_torch.extras.report.command import page
+from sgimd_torch.extras.table.names import COLOURS
+from sgimd_torch.extras.table.statistics import interquartile_mean
+from sgimd_torch.extras.table.variants import Variant, best_first
+from sgimd_torch.options.parse import parse
 from sgimd_torch.runs.read import read_run
 from sgimd_torch.spaces import Box
-from sgimd_torch.views.report import command as report
-from sgimd_torch.views.report import figures, provenance
-from sgimd_torch.views.report.command import page
-from sgimd_torch.views.statistics import interquartile_mean
-from sgimd_torch.views.variants import Variant, best_first
 
 FIGURES = [f"{what} of SGIM-D" for what in ("Error curve", "Landing points", "Misses", "Expected misses", "Regions")]
 ODD = "<b>&'$x\" "

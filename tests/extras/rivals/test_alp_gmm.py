@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sgimd_torch.rivals.alp_gmm import AlpGmm
+from sgimd_torch.extras.rivals.alp_gmm import AlpGmm
 from sgimd_torch.spaces import Box, stream
 from worlds import NO_CONTEXT, problem
 

@@ -1,9 +1,12 @@
 """CMA-ES as a search: generations around theta of the estimate, and a package that keeps to itself."""
 
+import sys
+
 import numpy as np
 import pytest
 
-from sgimd_torch.rivals.cma_es import CmaEs
+from sgimd_torch.extras.rivals.cma_es import CmaEs
+from sgimd_torch.options.catalogue import load_word
 from sgimd_torch.spaces import Box, Estimate, stream
 from worlds import World, drive, problem
 
@@ -61,3 +64,10 @@ def test_the_first_generation_spreads_by_sd_of_each_side_around_theta_of_the_est
 def test_a_pi_or_numbers_out_of_range_are_refused(dim, options, message) -> None:
     with pytest.raises(ValueError, match=message):
         CmaEs(problem(policies=Box.cube(0, 1, dim)), **options)
+
+
+def test_an_entry_that_is_not_installed_names_its_extra(monkeypatch):
+    monkeypatch.setitem(sys.modules, "cma", None)
+    sys.modules.pop("sgimd_torch.extras.rivals.cma_es", None)
+    with pytest.raises(ValueError, match=r"pip install 'sgimd-torch\[rivals\]'"):
+        load_word("search", "cma-es")

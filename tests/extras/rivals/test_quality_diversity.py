@@ -4,15 +4,20 @@ import numpy as np
 import pytest
 
 from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.extras.rivals.quality_diversity import (
+    cma_mae_alone,
+    cma_me_alone,
+    isoline_alone,
+    map_elites_alone,
+)
 from sgimd_torch.learner import Learner
-from sgimd_torch.rivals.quality_diversity import cma_mae, cma_me, isoline, map_elites
-from sgimd_torch.runs.tasks.robots import arm_demonstrations
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Array, Box, stream
+from sgimd_torch.tasks.robots import arm_demonstrations
 from worlds import NO_CONTEXT
 
 ARM = PlanarArm(6)
-ELITES, TEAMS = (map_elites, isoline), (cma_me, cma_mae)
+ELITES, TEAMS = (map_elites_alone, isoline_alone), (cma_me_alone, cma_mae_alone)
 BOTH = pytest.mark.parametrize("make", [*ELITES, *TEAMS])
 
 
@@ -72,13 +77,13 @@ def test_the_archive_is_told_of_a_batch_when_all_its_movements_were_made(make):
 
 
 def test_cma_me_moves_on_from_its_first_generation():
-    adapting, still = cma_me(ARM, 6), cma_me(ARM, 6, emitters=1, batch=500)
+    adapting, still = cma_me_alone(ARM, 6), cma_me_alone(ARM, 6, emitters=1, batch=500)
     live(adapting, 500), live(still, 500)
     assert cells_reached(adapting) > 2 * cells_reached(still)
 
 
 def test_variations_of_elites_spread_by_sd_and_elites_are_of_little_effort():
-    learner = map_elites(ARM, 7, first=50, batch=500, sd=0.01)
+    learner = map_elites_alone(ARM, 7, first=50, batch=500, sd=0.01)
     thetas = live(learner, 550)
     first, later = thetas[:50], thetas[50:]
     away = np.linalg.norm(later[:, None] - first, axis=2).min(axis=1)
@@ -104,10 +109,10 @@ REFUSED = [
     *((make, {"batch": 0}, "batch must be") for make in (*ELITES, *TEAMS)),
     *((make, {"first": 0}, "first must be a whole number") for make in ELITES),
     *((make, {"emitters": 0}, "emitters must be a whole number") for make in TEAMS),
-    *((cma_mae, {"learning_rate": rate}, "learning_rate must") for rate in (0.0, 1.5, np.nan)),
-    (map_elites, {"line": -0.1}, "line must be finite and >= 0"),
-    (map_elites, {"cells": 0}, "cells must be"),
-    (map_elites, {"cells": 2000}, "in all at most, got 2000 in 2 dimensions"),
+    *((cma_mae_alone, {"learning_rate": rate}, "learning_rate must") for rate in (0.0, 1.5, np.nan)),
+    (map_elites_alone, {"line": -0.1}, "line must be finite and >= 0"),
+    (map_elites_alone, {"cells": 0}, "cells must be"),
+    (map_elites_alone, {"cells": 2000}, "in all at most, got 2000 in 2 dimensions"),
 ]
 
 
@@ -126,13 +131,13 @@ def test_options_that_make_no_sense_are_refused(make, options, message):
 )
 def test_a_robot_with_contexts_or_a_wrong_rest_is_refused(spaces, message):
     with pytest.raises(ValueError, match=message):
-        cma_me(Elsewhere(*spaces), 0)
+        cma_me_alone(Elsewhere(*spaces), 0)
 
 
 def test_movements_of_cma_mae_stay_compact():
     """Its thresholds keep a cell worth improving, so it comes back with less effort; CMA-ME goes on to new cells."""
     effort = {make: np.square(live(make(ARM, 5), 1500)[-500:] - 0.5).mean() for make in TEAMS}
-    assert effort[cma_mae] < effort[cma_me]
+    assert effort[cma_mae_alone] < effort[cma_me_alone]
 
 
 @BOTH

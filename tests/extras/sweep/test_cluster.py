@@ -16,10 +16,10 @@ import pytest
 
 from odd import ODD, SWEEP, as_alone, odd_place, said_by
 from runs import ROOT, start
-from sgimd_torch.runs import cluster
+from sgimd_torch.extras.sweep import cluster
+from sgimd_torch.extras.sweep.command import main
+from sgimd_torch.runs.program import command
 from sgimd_torch.runs.read import movements_on_disk
-from sgimd_torch.runs.signals import command
-from sgimd_torch.runs.sweep import main
 
 EVALUATED = ["--evaluate-at", "10"]  # which also commits the movements before
 

@@ -7,17 +7,19 @@ import os
 import re
 import shutil
 import signal
+from pathlib import Path
 
 import pytest
 
+from boards import hparams_of
 from odd import ODD, SWEEP, as_alone, odd_place, said_by
 from runs import content_of, start
-from sgimd_torch.options.command_line import main as run
+from sgimd_torch.extras.sweep import parallel
+from sgimd_torch.extras.sweep.command import main, variants_of
 from sgimd_torch.options.config import Config
-from sgimd_torch.runs import parallel
+from sgimd_torch.runs.command import main as run
+from sgimd_torch.runs.program import Failed, command
 from sgimd_torch.runs.read import finished, movements_on_disk
-from sgimd_torch.runs.signals import Failed, command
-from sgimd_torch.runs.sweep import main, variants_of
 
 # An arm without physics; 40 movements and one evaluation take a moment.
 ARM = "--environment planar-arm-7 --movements 40 --evaluate-at 20 --repeats 0 --inverse linear"
@@ -104,6 +106,7 @@ def test_a_file_of_goals_that_has_changed_makes_a_run_unfinished(benchmark, tmp_
     assert not finished(config)
 
 
+@pytest.mark.slow
 def test_failures_are_named_in_the_order_of_the_list_and_the_others_go_on(tmp_path):
     configs, ended_well = [short(tmp_path, seed=seed) for seed in range(4)], []
     for seed in (1, 3):
@@ -179,7 +182,9 @@ def test_a_run_that_is_killed_is_named_and_goes_on_next_time(odd, begun, tmp_pat
     assert as_alone(odd, tmp_path)
 
 
-@pytest.mark.parametrize(("signum", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize(
+    ("signum", "code"), [(signal.SIGINT, 130), pytest.param(signal.SIGTERM, 143, marks=pytest.mark.slow)]
+)
 def test_stopped_it_stops_its_runs_and_goes_on_as_if_nothing_had_happened(
     odd, begun, tmp_path, monkeypatch, signum, code
 ):
@@ -197,8 +202,24 @@ def test_stopped_it_stops_its_runs_and_goes_on_as_if_nothing_had_happened(
 
 def test_no_library_for_figures_or_learning_is_loaded_to_watch_processes(tmp_path):
     program = (
-        "import sys, sgimd_torch.runs.sweep as sweep; sweep.main(sys.argv[1:]);"
+        "import sys, sgimd_torch.extras.sweep.command as sweep; sweep.main(sys.argv[1:]);"
         "print(sorted({'distributed', 'matplotlib', 'mujoco', 'torch', 'tensorboard'} & {*sys.modules}))"
     )
     code = start(program, "--dry-run", "--out", tmp_path)
     assert code.communicate()[0].splitlines()[-1] == "[]"
+
+
+@pytest.mark.slow
+def test_hyperparameters_of_a_sweep_are_what_tells_its_runs_apart_defaults_included(own):
+    words = "--environment planar-arm-7 --movements 50 --seeds 0 --repeats 0 --board true --out sweep"
+    vary = ["--vary", "algorithm=sagg-riac,practice", "--vary", "budget=1,15"]  # 1 is the default of practice
+    assert command(main, [*words.split(), *vary]) == 0
+    found = {path.parent.name: hparams_of(path) for path in Path("sweep").glob("*/seed-000")}
+    assert found == {
+        f"{algorithm},budget={budget}": (
+            {"algorithm": algorithm, "budget": budget, "environment": "planar-arm-7", "seed": 0},
+            ["error/mean"],
+        )
+        for algorithm in ("sagg-riac", "practice")
+        for budget in (1, 15)
+    }

@@ -5,9 +5,15 @@ import itertools
 import numpy as np
 import pytest
 
+from sgimd_torch.extras.table import statistics
+from sgimd_torch.extras.table.statistics import (
+    bootstrap_rng,
+    common_differences,
+    interquartile_mean,
+    interval,
+    iqm_interval,
+)
 from sgimd_torch.spaces import stream
-from sgimd_torch.views import statistics
-from sgimd_torch.views.statistics import bootstrap_rng, common_differences, interquartile_mean, interval, iqm_interval
 
 
 @pytest.fixture

@@ -11,13 +11,13 @@ import pytest
 
 from pages import rows_of as table_of
 from sgimd_torch.evaluation import Benchmark, save_benchmark
-from sgimd_torch.options.command_line import main as live
+from sgimd_torch.extras.report import command as report
+from sgimd_torch.extras.table import variants
+from sgimd_torch.extras.table.command import main
+from sgimd_torch.extras.table.results import print_table
+from sgimd_torch.runs.command import main as live
+from sgimd_torch.runs.program import command
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.runs.signals import command
-from sgimd_torch.views import variants
-from sgimd_torch.views.report import command as report
-from sgimd_torch.views.results import print_table
-from sgimd_torch.views.table import main
 
 FEW = "fewer than 5 seeds, too few for an interval: sgim-d (1)\n"
 

@@ -10,10 +10,10 @@ import pytest
 from PIL import Image
 
 from browser import chromium
+from sgimd_torch.extras.teach.command import serving
+from sgimd_torch.extras.teach.page import Page
+from sgimd_torch.extras.teach.taught import TaughtRun
 from sgimd_torch.options.config import Config
-from sgimd_torch.teach.command import serving
-from sgimd_torch.teach.page import Page
-from sgimd_torch.teach.taught import TaughtRun
 
 SIZE = {"width": 1150, "height": 640}
 TOKEN = "a-token-that-nobody-guesses"

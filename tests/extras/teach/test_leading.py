@@ -8,11 +8,11 @@ import pytest
 
 from sgimd_torch.environments.fishing_rod import JOINTS, FishingRod
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.runs.tasks import Task
+from sgimd_torch.extras.teach.arm import STEP
+from sgimd_torch.extras.teach.leading import Leading
+from sgimd_torch.extras.teach.led import HandLed, arm_led, hand_led_of, planar_model, rod_led
 from sgimd_torch.spaces import Box, stream
-from sgimd_torch.teach.arm import STEP
-from sgimd_torch.teach.leading import Leading
-from sgimd_torch.teach.led import HandLed, arm_led, hand_led_of, planar_model, rod_led
+from sgimd_torch.tasks import Task
 
 ROUNDING = 1e-6  # relative: a speed is a difference of angles, an acceleration one of speeds
 NO_CONTEXT = np.zeros(0)

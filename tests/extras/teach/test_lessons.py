@@ -9,11 +9,11 @@ from sgimd_torch.algorithms.paper import observation
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
 from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.runs.tasks import Task
+from sgimd_torch.extras.teach.leading import Leading
+from sgimd_torch.extras.teach.led import arm_led, rod_led
+from sgimd_torch.extras.teach.lessons import lesson_by_hand
 from sgimd_torch.spaces import stream
-from sgimd_torch.teach.leading import Leading
-from sgimd_torch.teach.led import arm_led, rod_led
-from sgimd_torch.teach.lessons import lesson_by_hand
+from sgimd_torch.tasks import Task
 
 TIMES = np.linspace(0, 1.0, 51)
 

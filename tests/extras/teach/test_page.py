@@ -10,9 +10,9 @@ import pytest
 from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
+from sgimd_torch.extras.teach.command import serving
+from sgimd_torch.extras.teach.guard import guard, guarded
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.teach.command import serving
-from sgimd_torch.teach.guard import guard, guarded
 
 PATH = np.array([[0.05, 0.0, 0.02], [0.12, -0.02, 0.1], [0.2, -0.06, 0.2], [0.26, -0.1, 0.12], [0.3, -0.12, 0.0]])
 """m, from where the hand begins: it swings to the right, up and down again."""

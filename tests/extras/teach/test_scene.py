@@ -5,13 +5,13 @@ import pytest
 from viser.transforms import SO3
 
 from sgimd_torch import FishingRod, MujocoRobot, PlanarArm
-from sgimd_torch.runs.tasks import Task
+from sgimd_torch.extras.teach.chart import Chart, picture_of
+from sgimd_torch.extras.teach.command import serving
+from sgimd_torch.extras.teach.leading import Leading
+from sgimd_torch.extras.teach.led import hand_led_of
+from sgimd_torch.extras.teach.scene import Scene
 from sgimd_torch.spaces import Box
-from sgimd_torch.teach.chart import Chart, picture_of
-from sgimd_torch.teach.command import serving
-from sgimd_torch.teach.leading import Leading
-from sgimd_torch.teach.led import hand_led_of
-from sgimd_torch.teach.scene import Scene
+from sgimd_torch.tasks import Task
 
 ARM = """<mujoco><worldbody>
   <geom type="plane" size="1 1 1"/>

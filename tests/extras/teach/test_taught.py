@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from sgimd_torch.environments.planar_arm import PlanarArm
-from sgimd_torch.options.command_line import main as sgimd_run
+from sgimd_torch.extras.teach.by_hand import BY_HAND, ByHand
+from sgimd_torch.extras.teach.command import options_of
+from sgimd_torch.extras.teach.taught import TaughtRun
 from sgimd_torch.options.config import Config, words
+from sgimd_torch.runs.command import main as sgimd_run
+from sgimd_torch.runs.program import command
 from sgimd_torch.runs.read import read_run
-from sgimd_torch.runs.signals import command
-from sgimd_torch.runs.tasks.robots import arm_demonstrations
-from sgimd_torch.teach.by_hand import BY_HAND, ByHand
-from sgimd_torch.teach.command import options_of
-from sgimd_torch.teach.taught import TaughtRun
+from sgimd_torch.tasks.robots import arm_demonstrations
 
 SHOWN = arm_demonstrations(PlanarArm())
 

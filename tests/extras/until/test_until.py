@@ -1,13 +1,19 @@
 """``sgimd run --until``: a run ends once the learner expects small errors, and stays ended; the errors are found."""
 
+import re
+
 import numpy as np
 import pytest
 
 from runs import about_of, content_of, end, stopped_at
-from sgimd_torch.options.command_line import main
+from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.extras.until.until import expected_error, goals_reached
 from sgimd_torch.options.config import Config
+from sgimd_torch.runs.command import main
+from sgimd_torch.runs.program import command
 from sgimd_torch.runs.read import finished, read_run
-from sgimd_torch.runs.signals import command
+from sgimd_torch.spaces import stream
+from worlds import Sure
 
 ARM = "--environment planar-arm-7 --seed 3 --movements 260 --evaluate-at 120"
 
@@ -42,10 +48,11 @@ def test_a_run_ends_as_soon_as_the_expected_error_is_small_and_is_finished(early
     assert (n, run.summary["finished"], run.config["movements"]) == (150, True, 260)
     assert run.evaluation["movements"].tolist() == [120, n]  # the last evaluation is that of the end, with its noise
     assert np.isfinite(run.evaluation["noise_floor"]).tolist() == [False, True]
-    assert run.at(n, "expected_error") <= run.summary["expected"] <= 0.03  # the larger of what it expects and makes
+    told = float(re.fullmatch(r"it expected ([0-9.]+) m", run.summary["ended_early"])[1])
+    assert run.at(n, "expected_error") - 1e-4 < told <= 0.03  # the larger of what it expects and makes
     assert content_of(path_of(early))["events"] == whole["events"][:n]  # looking changes nothing
     config = Config(
-        seed=3, movements=260, until=0.03, evaluate_at=(120,), out=early, parts={"environment": "planar-arm-7"}
+        seed=3, movements=260, evaluate_at=(120,), out=early, parts={"environment": "planar-arm-7", "until": 0.03}
     )
     assert finished(config)
 
@@ -117,3 +124,14 @@ def test_a_run_goes_on_while_answers_miss_by_more_than_its_limit_whatever_is_exp
     assert go(tmp_path, "--until=0.02", "--inverse=confident:Sure") == 0
     assert read_run(path_of(tmp_path)).summary["movements"] == 260
     assert "after 50 movements 0.0125 m was expected, but 20 answers missed by 0." in capsys.readouterr().err
+
+
+def test_an_error_is_expected_in_remembered_contexts_at_goals_such_as_one_in_each_tile_with_two_outcomes() -> None:
+    arm = PlanarArm(5, context=True)
+    inverse, rng = Sure(arm), stream(0, "draws")
+    memory = inverse.problem.memory
+    for context, outcome in ((0.2, 0.5), (0.3, 0.5), (0.4, -0.9)):
+        memory.add(np.array([context]), np.full(5, 0.5), np.array([outcome, outcome]))
+    assert expected_error(inverse, np.zeros((30, 2)), rng) == pytest.approx(0.5)
+    assert {*inverse.asked[0]} | {*inverse.asked[1]} <= {0.2, 0.3, 0.4}
+    assert len(goals_reached(inverse, rng)) == 1  # one tile has two outcomes

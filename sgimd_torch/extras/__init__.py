@@ -1,0 +1,1 @@
+"""Rooms: features that can be taken away, each with its folder; see `sgimd_torch.rooms`."""

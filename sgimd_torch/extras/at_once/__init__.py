@@ -1,0 +1,3 @@
+"""Several robots that move at once."""
+
+WORDS = "hook  hook  at-once=AtOnce"

@@ -1,0 +1,3 @@
+"""Goals for evaluation, from where runs landed."""
+
+WORDS = "command  command  benchmark"

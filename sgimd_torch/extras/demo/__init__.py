@@ -1,0 +1,5 @@
+"""A first look: three learners side by side."""
+
+WORDS = "command  command  demo"
+NEEDS = ("report", "sweep", "table")
+INSTALL = "plot"

@@ -1,0 +1,44 @@
+"""Pictures on the board of a run, with ``--board true``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from sgimd_torch.runs.hooks import Hook, Listener
+
+if TYPE_CHECKING:
+    from sgimd_torch.board.listener import BoardListener
+    from sgimd_torch.evaluation import Evaluation
+    from sgimd_torch.runs.run import RunLoop
+
+
+class Pictures(Hook):
+    """Pictures on the board."""
+
+    def listener(self, loop: RunLoop) -> Listener | None:
+        """A listener that draws them, if the run has a board."""
+        if not loop.parts.config["board"]:
+            return None
+        from sgimd_torch.board.listener import BoardListener  # most runs have no board
+
+        (board,) = (listener for listener in loop.listeners if isinstance(listener, BoardListener))
+        return Drawing(loop, board)
+
+
+class Drawing(Listener):
+    """Draws maps of T. They take as long as 100 movements, so they are drawn only when the number of movements has
+    doubled since the last ones, and at the end."""
+
+    def __init__(self, loop: RunLoop, board: BoardListener) -> None:
+        self._parts, self._board, self._drawn_at = loop.parts, board, 0
+
+    def evaluated(self, movements: int, evaluations: Mapping[str, Evaluation]) -> None:
+        """Draw the errors of an evaluation, and the competence of the regions."""
+        if movements < 2 * self._drawn_at and movements != self._parts.config.movements:
+            return
+        from sgimd_torch.extras.pictures.pictures import maps_of
+
+        self._drawn_at, robot = movements, self._parts.environment
+        goals, errors = self._parts.benchmark.goals, evaluations["own"].errors
+        self._board.show_pictures(maps_of(self._board.regions, robot.outcomes, robot.contexts, goals, errors))

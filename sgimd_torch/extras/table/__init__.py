@@ -1,0 +1,3 @@
+"""Tables of results, with statistics over seeds."""
+
+WORDS = "command  command  table"

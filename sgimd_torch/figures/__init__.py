@@ -1,1 +1,0 @@
-"""Parts of figures: maps of T, axes, colours and files. Needs matplotlib."""
