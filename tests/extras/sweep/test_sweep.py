@@ -88,11 +88,12 @@ def test_every_run_is_what_it_would_be_alone_and_a_second_start_does_nothing(tmp
         place = tmp_path / "study" / name / "seed-000"
         assert content_of(place) == content_of(tmp_path / "alone" / name / "seed-000")
         assert f"{place}: 40 movements" in place.with_suffix(".log").read_text()
-    before = {path: path.stat().st_mtime_ns for path in (tmp_path / "study").rglob("*")}
+    files = [path for path in (tmp_path / "study").rglob("*") if path.is_file()]  # to read a record touches its folder
+    before = {path: path.stat().st_mtime_ns for path in files}
     capsys.readouterr()
     assert swept(*options) == 0
     assert "2 of them finished" in capsys.readouterr().err
-    assert {path: path.stat().st_mtime_ns for path in (tmp_path / "study").rglob("*")} == before
+    assert {path: path.stat().st_mtime_ns for path in (tmp_path / "study").rglob("*") if path.is_file()} == before
 
 
 def test_a_file_of_goals_that_has_changed_makes_a_run_unfinished(benchmark, tmp_path, go):
