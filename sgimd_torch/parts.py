@@ -18,7 +18,7 @@ import numpy as np
 
 from sgimd_torch.calls import Built
 from sgimd_torch.environments.protocol import Environment, check_robot
-from sgimd_torch.memory import Memory
+from sgimd_torch.memory import MakeMemory, Memory, memory_for
 from sgimd_torch.spaces import Array, AskingAttempt, Attempt, Demonstration, Estimate, stream
 
 Made = TypeVar("Made")
@@ -30,7 +30,7 @@ class Problem:
     Args:
         environment: robot and world; boxes, rest and noise are read, and nothing is executed.
         seed: number from which all random streams of the learner come, at least 0.
-        memory: exemplars to start from; they are copied. None: no exemplars.
+        memory: constructor of the memory, or a memory of exemplars to start from, which is copied.
         inverse: constructor of the inverse model.
 
     Attributes:
@@ -42,7 +42,7 @@ class Problem:
         autonomous: autonomous strategy, which is made before the social one.
 
     Raises:
-        ValueError: `check_robot` refuses the environment, or ``memory`` has exemplars of another robot.
+        ValueError: `check_robot` refuses the environment, or `memory_for` the ``memory``.
     """
 
     autonomous: Strategy
@@ -51,7 +51,7 @@ class Problem:
         self,
         environment: Environment,
         seed: int,
-        memory: Memory | None = None,
+        memory: Memory | MakeMemory = Memory,
         *,
         inverse: Callable[[Problem], Inverse],
     ) -> None:
@@ -60,7 +60,7 @@ class Problem:
         self.rest, self.outcome_noise, self.seed = environment.rest, environment.outcome_noise, seed
         self.tolerance = max(environment.outcome_noise, 0.02)
         self._shared: dict[object, Any] = {}
-        self.memory = Memory(*self.dims) if memory is None else memory.copy_for(self.dims)
+        self.memory = memory_for(memory, self.dims)
         self.policies.check("thetas of a memory to start from", self.memory.thetas, "is it another robot's?")
         self.remarks: list[str] = []
         self.inverse = Inverse.of(inverse, self)
@@ -164,6 +164,11 @@ class Inverse(Part):
     def answer_many(self, contexts: Array, goals: Array) -> list[Estimate]:
         """Estimates for ``goals`` ``(n, outcome_dim)`` in ``contexts`` ``(n, context_dim)``. Default: one by one."""
         return [self(context, goal) for context, goal in zip(contexts, goals, strict=True)]
+
+    def uncertainty(self, context: Array, goals: Array) -> Array:
+        """How unsure answers to ``goals`` ``(n, outcome_dim)`` are, ``(n,)``, in the unit of T. A goal model takes the
+        goal where it is largest. Default: ``sd`` of each answer."""
+        return np.array([self(context, goal).sd or 0.0 for goal in goals])
 
     def predict(self, context: Array, theta: Array) -> Array | None:
         """Expected outcome ``(outcome_dim,)`` of ``theta`` ``(theta_dim,)``. Default: None, which means unknown."""

@@ -6,13 +6,14 @@ from collections.abc import Callable
 from typing import Final, TypeAlias
 
 from sgimd_torch.learner import Learner, Watcher
-from sgimd_torch.memory import Memory
+from sgimd_torch.memory import MakeMemory, Memory
+from sgimd_torch.memory.exemplars import Exemplars
 from sgimd_torch.parts import Inverse, Problem
 from sgimd_torch.rooms import Usual
 
 MakeInverse: TypeAlias = Callable[[Problem], Inverse]
-Begin: TypeAlias = Callable[[int, Memory | None], Learner]
-"""Function (seed, exemplars to start from) -> learner."""
+Begin: TypeAlias = Callable[[int, Memory | MakeMemory], Learner]
+"""Function (seed, memory) -> learner."""
 MakeWatcher: TypeAlias = Callable[[Begin, Learner, Memory | None], Watcher | None]
 """Function (begin, learner, prior) -> watcher of the learner; None: nobody watches."""
 
@@ -27,21 +28,23 @@ def nobody(begin: Begin, learner: Learner, prior: Memory | None) -> Watcher | No
 usual_watcher: Final = Usual("watch", "none", nobody)
 
 
-def watched(begin: Begin, seed: int, memory: Memory | None, prior: Memory | None, watch: MakeWatcher) -> Learner:
+def watched(begin: Begin, seed: int, memory: Memory | MakeMemory, prior: Memory | None, watch: MakeWatcher) -> Learner:
     """The learner that ``begin`` builds; where its robot changes, ``watch`` makes it begin again.
 
     Args:
         begin: function that builds the learner.
         seed: number from which all random streams of the learner come.
-        memory: exemplars to start from; None: no exemplars.
+        memory: memory, or exemplars to start from.
         prior: exemplars of another robot, such as a simulator; they count as far as they hold. None: no exemplars.
         watch: watcher.
 
     Raises:
         ValueError: both ``memory`` and ``prior`` are given, or the watcher refuses the learner.
     """
-    if memory is not None and prior is not None:
-        raise ValueError("give memory, exemplars of this robot, or prior, exemplars of another robot; got both")
-    learner = begin(seed, memory if prior is None else prior)
+    if prior is not None:
+        if isinstance(memory, Memory):
+            raise ValueError("give memory, exemplars of this robot, or prior, exemplars of another robot; got both")
+        memory = Exemplars.of(prior).memory_like(memory(prior.context_dim, prior.theta_dim, prior.outcome_dim))
+    learner = begin(seed, memory)
     learner.watcher = watch(begin, learner, prior)
     return learner

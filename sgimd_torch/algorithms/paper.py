@@ -22,7 +22,7 @@ from sgimd_torch.goals.regions import absolute_progress
 from sgimd_torch.inverses.local import LocalInverse
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Correspondence, Learner
-from sgimd_torch.memory import Memory
+from sgimd_torch.memory import MakeMemory, Memory
 from sgimd_torch.parts import Problem, Social
 from sgimd_torch.searches.simplex import NelderMead
 from sgimd_torch.strategies import Babble, GoalBabbling, Imitate, Mimic, Remember, Rest
@@ -41,7 +41,7 @@ VARIED: Final = partial(Imitate, exact_first=False)
 
 
 def random_exploration(
-    environment: Environment, seed: int, *, inverse: MakeInverse = LocalProcess, memory: Memory | None = None
+    environment: Environment, seed: int, *, inverse: MakeInverse = LocalProcess, memory: Memory | MakeMemory = Memory
 ) -> Learner:
     """Uniform movements: random exploration."""
     problem = Problem(environment, seed, memory, inverse=inverse)
@@ -54,7 +54,7 @@ def observation(
     *,
     correspondence: Correspondence,
     inverse: MakeInverse = LocalProcess,
-    memory: Memory | None = None,
+    memory: Memory | MakeMemory = Memory,
 ) -> Learner:
     """Learning by observation: remembers each demonstration and never moves."""
     problem = Problem(environment, seed, memory, inverse=inverse)
@@ -68,7 +68,7 @@ def imitation(
     correspondence: Correspondence,
     epsilon: float = 0.05,
     inverse: MakeInverse = LocalProcess,
-    memory: Memory | None = None,
+    memory: Memory | MakeMemory = Memory,
 ) -> Learner:
     """Repeats the last demonstration with small variations until the next one.
 
@@ -78,7 +78,7 @@ def imitation(
         correspondence: function from times and trajectory to theta_d, eq. (6).
         epsilon: largest variation of each parameter, in the unit of the parameter.
         inverse: inverse model.
-        memory: exemplars to start from; None: the memory starts empty.
+        memory: memory, or exemplars to start from.
     """
     problem = Problem(environment, seed, memory, inverse=inverse)
     mimic = Mimic(problem, repeats=None, epsilon=epsilon)
@@ -91,7 +91,7 @@ def sagg_riac(
     seed: int,
     *,
     inverse: MakeInverse = LocalProcess,
-    memory: Memory | None = None,
+    memory: Memory | MakeMemory = Memory,
     prior: Memory | None = None,
     watch: MakeWatcher = usual_watcher,
     **parts: Any,
@@ -102,13 +102,13 @@ def sagg_riac(
         environment: robot and world; nothing is executed here.
         seed: number from which all random streams of the learner come.
         inverse: inverse model; searches begin at its answer.
-        memory: exemplars to start from; None: the memory starts empty.
+        memory: memory, or exemplars to start from.
         prior: exemplars of another robot, such as a simulator, which count as far as they hold; None: no exemplars.
         watch: watcher, which notices changes of the robot.
         parts: parts and options of `GoalBabbling`.
     """
 
-    def begin(seed: int, memory: Memory | None) -> Learner:
+    def begin(seed: int, memory: Memory | MakeMemory) -> Learner:
         problem = Problem(environment, seed, memory, inverse=inverse)
         return Learner(problem, GoalBabbling(problem, **parts))
 
@@ -123,7 +123,7 @@ def sgim_d(
     correspondence: Correspondence,
     social: Callable[[Problem], Social] = Imitate,
     inverse: MakeInverse = LocalProcess,
-    memory: Memory | None = None,
+    memory: Memory | MakeMemory = Memory,
     prior: Memory | None = None,
     watch: MakeWatcher = usual_watcher,
     **parts: Any,
@@ -138,13 +138,13 @@ def sgim_d(
         correspondence: function from times and trajectory to theta_d, eq. (6).
         social: social strategy, which uses the demonstrations.
         inverse: inverse model; searches begin at its answer.
-        memory: exemplars to start from; None: the memory starts empty.
+        memory: memory, or exemplars to start from.
         prior: exemplars of another robot, such as a simulator, which count as far as they hold; None: no exemplars.
         watch: watcher, which notices changes of the robot.
         parts: parts and options of `GoalBabbling`.
     """
 
-    def begin(seed: int, memory: Memory | None) -> Learner:
+    def begin(seed: int, memory: Memory | MakeMemory) -> Learner:
         problem = Problem(environment, seed, memory, inverse=inverse)
         problem.autonomous = GoalBabbling(problem, **parts)
         return Learner(problem, problem.autonomous, social=Social.of(social, problem), correspondence=correspondence)

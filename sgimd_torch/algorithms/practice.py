@@ -17,7 +17,7 @@ from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.goals.within_reach import WithinReach
 from sgimd_torch.inverses.among_effects import AmongEffects
 from sgimd_torch.learner import Correspondence, Learner
-from sgimd_torch.memory import Memory
+from sgimd_torch.memory import MakeMemory, Memory
 from sgimd_torch.parts import Problem, Social
 from sgimd_torch.searches.explore import Returning
 from sgimd_torch.searches.vary import Vary
@@ -39,14 +39,14 @@ def practice(
     seed: int,
     *,
     inverse: MakeInverse = AmongEffects,
-    memory: Memory | None = None,
+    memory: Memory | MakeMemory = Memory,
     prior: Memory | None = None,
     watch: MakeWatcher = usual_watcher,
     **parts: Any,
 ) -> Learner:
     """Practice: one movement for each goal within reach, by a local Gaussian process; no teacher."""
 
-    def begin(seed: int, memory: Memory | None) -> Learner:
+    def begin(seed: int, memory: Memory | MakeMemory) -> Learner:
         problem = Problem(environment, seed, memory, inverse=inverse)
         return Learner(problem, GoalBabbling(problem, **parts))
 
@@ -61,7 +61,7 @@ def practice_taught(
     correspondence: Correspondence,
     social: Callable[[Problem], Social] = ONCE,
     inverse: MakeInverse = AmongEffects,
-    memory: Memory | None = None,
+    memory: Memory | MakeMemory = Memory,
     prior: Memory | None = None,
     watch: MakeWatcher = usual_watcher,
     **parts: Any,
@@ -71,7 +71,7 @@ def practice_taught(
     It learns most when all demonstrations come at the start. Options as for `practice`.
     """
 
-    def begin(seed: int, memory: Memory | None) -> Learner:
+    def begin(seed: int, memory: Memory | MakeMemory) -> Learner:
         problem = Problem(environment, seed, memory, inverse=inverse)
         problem.autonomous = GoalBabbling(problem, **parts)  # its goal model is told of demonstrated goals
         return Learner(problem, problem.autonomous, social=Social.of(social, problem), correspondence=correspondence)

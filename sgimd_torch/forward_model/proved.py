@@ -45,7 +45,7 @@ class ProvedModel(ModelBased):
     def __init__(self, problem: Problem, **options: Any) -> None:
         super().__init__(problem, **options)
         self.process, self.model_inverse = LocalProcess(problem), ModelInverse(problem)
-        self._earlier = Memory(*problem.dims)
+        self._earlier = problem.memory.empty()
         before = problem.over(self._earlier)
         self._rivals = LocalProcess(before), ModelInverse(before)
         # For each movement: its row, the variance that the process predicts, and the errors of process and model.

@@ -66,7 +66,7 @@ class SharedModel(Trained):
             return
         for _, exemplars, *_ in refreshes:
             if exemplars > int(self.model.n_seen):
-                self.model.refresh(Exemplars.of(memory, slice(exemplars)).memory)
+                self.model.refresh(Exemplars.of(memory, slice(exemplars)).memory_like(memory))
 
     def _checkpoint(self, directory: Path, refreshes: Sequence[Row]) -> dict[str, Any]:
         try:

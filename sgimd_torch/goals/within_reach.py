@@ -55,7 +55,7 @@ class WithinReach(UniformGoals):
 
     by_competence = False  # `add` uses the error of the last movement; a subclass that uses competence says True
 
-    def __init__(self, problem: Problem, *, candidates: int = 2) -> None:
+    def __init__(self, problem: Problem, *, candidates: int = 4) -> None:
         super().__init__(problem)
         self.candidates = check_count("candidates", candidates, 1)
         inverse = type(problem.inverse)
@@ -76,8 +76,8 @@ class WithinReach(UniformGoals):
         goal, inverse = self._within_reach(context), self.problem.inverse
         if self.candidates == 1 or not inverse.says_how_sure or inverse.effects() is not None or not self._n_updated:
             return goal
-        goals = [goal, *(self._within_reach(context) for _ in range(self.candidates - 1))]
-        return max(goals, key=lambda goal: inverse(np.asarray(context, dtype=np.float64), goal).sd or 0.0)
+        goals = np.stack([goal, *(self._within_reach(context) for _ in range(self.candidates - 1))])
+        return np.asarray(goals[inverse.uncertainty(np.asarray(context, dtype=np.float64), goals).argmax()])
 
     def _within_reach(self, context: ArrayLike) -> Array:
         """A goal ``(outcome_dim,)``, uniform in T, or in the box that is widened by the step."""

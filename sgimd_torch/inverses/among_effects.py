@@ -40,6 +40,10 @@ class AmongEffects(Inverse):
             self._of_effective = LocalProcess(self.problem.over(effective))
         return self._of_effective(context, goal)
 
+    def uncertainty(self, context: Array, goals: Array) -> Array:
+        """That of the process of all movements: a goal model asks for it only while all movements have an effect."""
+        return self.of_all.uncertainty(context, goals)
+
     def predict(self, context: Array, theta: Array) -> Array | None:
         """Prediction of `LocalProcess`, fitted to all movements."""
         return self.of_all.predict(context, theta)

@@ -1,8 +1,8 @@
-"""A Gaussian process, which predicts outcomes and their variances from similar movements.
+"""Lengths and kernel of a Gaussian process, which predicts outcomes from similar movements.
 
 Our addition, not in the paper; Rasmussen & Williams (2006), chapters 2 and 5. All outcome dimensions share one kernel,
-smooth plus rough, both Matern 5/2. The rough part explains what the smooth part cannot, so that only the noise stated
-by the environment counts as noise.
+smooth plus rough, both rational quadratic (eq. 4.19, alpha 3). The rough part explains what the smooth part cannot, so
+that only the noise stated by the environment counts as noise.
     lengths = fit_lengths(inputs, outcomes); kernel = choose_kernel(groups, noise)
 Each input is divided by its length scale, see ``fit_lengths``; inputs are then "in lengths".
 """
@@ -29,6 +29,7 @@ _SCALES: Final = (0.5, 1.0, 2.0)  # of the grid of kernels
 _ROUGH: Final = ((1.0, 0.0), *itertools.product((4.0, 12.0), (0.03, 0.1, 0.3, 0.6)))  # (finer, share) of the grid
 _SMOOTH: Final = Kernel(1.0, 1.0, 0.0, 0.0)
 _STEPS: Final = 30  # largest number of steps of the fit of lengths
+_ENOUGH: Final = 1e-4  # relative gain of likelihood below which the fit of lengths ends
 
 
 Inputs = ParamSpec("Inputs")
@@ -55,7 +56,7 @@ def fit_lengths(inputs: Array, outcomes: Array) -> Array:
     dim = inputs.shape[1]
     deviations = outcomes - outcomes.mean(axis=0)
     deviations = deviations / deviations.std()
-    guess = np.log(1.5 * np.sqrt(dim))
+    guess = np.log(1.5 * np.sqrt(max(1, np.ptp(inputs, axis=0).astype(bool).sum())))  # constant inputs do not count
     transposed, kernels = np.ascontiguousarray(inputs.T), compiled("sgimd_torch.inverses.kernels")
 
     def loss(parameters: Array) -> tuple[float, Array]:
@@ -78,7 +79,9 @@ def fit_lengths(inputs: Array, outcomes: Array) -> Array:
 
     bounds = [(guess - 5, guess + np.log(2))] * dim + [(np.log(_LEAST_NOISE), np.log(3))]
     start = np.append(np.full(dim, guess), np.log(0.05))
-    fit = minimize(loss, start, jac=True, method="L-BFGS-B", bounds=bounds, options={"maxiter": _STEPS})
+    fit = minimize(
+        loss, start, jac=True, method="L-BFGS-B", bounds=bounds, options={"maxiter": _STEPS, "ftol": _ENOUGH}
+    )
     return np.exp(fit.x[:dim])
 
 

@@ -31,7 +31,6 @@ from sgimd_torch.memory.jit import (
 from sgimd_torch.spaces import Array
 
 STEPS: Final = 4  # largest number of Gauss-Newton steps from each start
-STARTS: Final = 6  # number of exemplars where steps begin, each with a process of its own
 JUDGED: Final = 20  # number of movements most like a start, on which the surprise of its process is measured
 DAMPINGS: Final = (1e-3, 0.1, 1.0, 10.0)  # all tried in each step, relative to the mean diagonal of J J^T
 GROSS: Final = 9.0  # squared residual, relative to the usual one, from which on an exemplar is a gross error
@@ -39,17 +38,9 @@ DETERMINED: Final = 0.5  # variance of an outcome given all others, relative to 
 OUTLIERS: Final = 8  # largest number of gross errors among the exemplars of a process
 USUAL: Final = 4.0  # largest squared residual that counts in full when the usual one is computed
 TINY: Final = 1e-300  # guard against 0 where a number is divided or its logarithm is taken
-ROOT5: Final = float(np.sqrt(5))
 KERNEL: Final = types.NamedUniTuple(float64, 4, Kernel)  # type: ignore[no-untyped-call]
 MOVEMENTS: Final = types.NamedTuple([TABLE, TABLE, TABLE, TABLE, NUMBERS, TABLE], Movements)  # type: ignore[no-untyped-call]
-QUESTION: Final = types.NamedTuple([NUMBERS, NUMBERS, LISTS, NUMBERS], Question)  # type: ignore[no-untyped-call]
-
-
-@jit_helper
-def matern(distance: float) -> tuple[float, float]:
-    """Matern 5/2 kernel, and its derivative divided by the distance."""
-    decay = np.exp(-ROOT5 * distance)
-    return (1 + ROOT5 * distance + 5 / 3 * distance**2) * decay, -5 / 3 * (1 + ROOT5 * distance) * decay
+QUESTION: Final = types.NamedTuple([NUMBERS, NUMBERS, ROWS, LISTS, ROWS, NUMBERS], Question)  # type: ignore[no-untyped-call]
 
 
 @jit_helper
@@ -62,14 +53,15 @@ def covariances(inputs: Array, kernel: Kernel, point: Array, covariance: Array, 
     for k in range(len(point)):
         for j in range(n):
             covariance[j] += (inputs[k, j] - point[k]) ** 2
+    smooth, rough = scale**2 / 6, (finer * scale) ** 2 / 6
     for j in range(n):
-        distance = scale * np.sqrt(covariance[j])
-        value, by_distance = matern(distance)
+        near = 1 / (1 + smooth * covariance[j])
         if share > 0:
-            rough, rough_by_distance = matern(finer * distance)
-            value += share * (rough - value)
-            by_distance += share * (finer**2 * rough_by_distance - by_distance)
-        covariance[j], slope[j] = value, scale**2 * by_distance
+            nearer = 1 / (1 + rough * covariance[j])
+            covariance[j] = (1 - share) * near**3 + share * nearer**3
+            slope[j] = -6 * ((1 - share) * smooth * near**4 + share * rough * nearer**4)
+        else:
+            covariance[j], slope[j] = near**3, -6 * smooth * near**4
 
 
 @compiled_for(TABLE, KERNEL)
@@ -91,8 +83,7 @@ def fitted_process(rows: np.ndarray, inputs: Array, outcomes: Array, kernel: Ker
     contradicted. So gross errors, such as those of a camera that loses the object, hardly count. A movement far from
     all others is contradicted by none."""
     n, inputs, outcomes = len(rows), as_columns(inputs, rows), as_columns(outcomes, rows)
-    covariance, _ = covariance_matrix(inputs, kernel)
-    process = process_with(inputs, outcomes, kernel, covariance)
+    process = process_of(inputs, outcomes, kernel)
     precision = precisions(process.factor)
     for _ in range(OUTLIERS):
         largest, outlier, usual = 0.0, 0, 0.0
@@ -108,9 +99,12 @@ def fitted_process(rows: np.ndarray, inputs: Array, outcomes: Array, kernel: Ker
 
 
 @jit_helper
-def process_with(inputs: Array, outcomes: Array, kernel: Kernel, covariance: Array) -> GaussianProcess:
-    """The process of movements with this ``covariance`` ``(n, n)``, without noise, the lower half alone."""
+def process_of(inputs: Array, outcomes: Array, kernel: Kernel) -> GaussianProcess:
+    """The process of these movements, columns of ``inputs`` and ``outcomes``, all with the same noise."""
     m, n = outcomes.shape
+    covariance, slope = np.zeros((n, n)), np.empty(n)
+    for i in range(n):
+        covariances(inputs, kernel, inputs[:, i].copy(), covariance[i, : i + 1], slope[: i + 1])
     factor, weights, mean, variance = factorised(covariance, kernel.noise), np.empty((m, n)), np.empty(m), 0.0
     for k in range(m):
         mean[k] = outcomes[k].sum() / n
@@ -158,7 +152,16 @@ def precisions(factor: Array) -> Array:
     n = len(factor)
     root, diagonal = np.zeros((n, n)), np.zeros(n)
     for i in range(n):  # row i of the inverse factor
-        for k in range(i):
+        whole = i - i % 4
+        for k in range(0, whole, 4):  # four rows at a time; right of its diagonal a row is 0
+            for j in range(k + 4):
+                root[i, j] -= (
+                    factor[i, k] * root[k, j]
+                    + factor[i, k + 1] * root[k + 1, j]
+                    + factor[i, k + 2] * root[k + 2, j]
+                    + factor[i, k + 3] * root[k + 3, j]
+                )
+        for k in range(whole, i):
             for j in range(k + 1):
                 root[i, j] -= factor[i, k] * root[k, j]
         for j in range(i):
@@ -254,25 +257,28 @@ def answer(question: Question, known: Movements, kernel: Kernel) -> tuple[Array,
     """theta of the candidate with the least expected squared error, noise included, its expected outcome, and the
     standard deviation of the outcome from it.
 
-    Each start has a process of its own, of the movements most like it, and with it a variance and a noise of its own.
-    So a slow movement is preferred to a fast one that cannot be repeated. Candidates are each start, the end of steps
-    from it, and the answer of `LocallyLinear`, judged by the process of the first start.
+    Candidates are each start, the end of steps from it, and the answer by linear regression. A process of the movements
+    most like a start has a variance and a noise of its own. So a slow movement is preferred to a fast one, which cannot
+    be repeated.
     """
-    context, goal, alike, linear = question
-    m, (n_starts, k) = len(goal), alike.shape
+    context, goal, starts, alike, process_of, linear = question
+    m, k = len(goal), alike.shape[1]
     covariance, slope = np.empty(k), np.empty(k)
-    least, best, outcome, sd = np.inf, linear, goal, 0.0
-    for start in range(n_starts):
-        if start == 0 or k < len(known.inputs):  # else the process of all movements serves every start
-            rows = alike[start]
+    least, best, outcome, sd, held = np.inf, linear, goal, 0.0, 0
+    rows = alike[0]
+    process, precision = fitted_process(rows, known.inputs, known.outcomes, kernel)
+    for start in range(len(starts)):
+        if process_of[start] != held:
+            held = process_of[start]
+            rows = alike[held]
             process, precision = fitted_process(rows, known.inputs, known.outcomes, kernel)
         surprise = 0.0  # mean squared residual near the start
-        for row in alike[start, :JUDGED]:
+        for row in rows[:JUDGED]:
             j = int(np.argmax(rows == row))
             surprise += squared_residual(process, j, precision[j]) / min(JUDGED, k)
         inflation = m * max(1.0, surprise)
         scatter = inflation * process.variance * kernel.noise
-        row = alike[start, 0]
+        row = starts[start]
         theta, j = known.thetas[row], int(np.argmax(rows == row))
         if len(context):
             covariances(process.inputs, kernel, in_lengths(theta, context, known.units), covariance, slope)
@@ -298,10 +304,47 @@ def answer(question: Question, known: Movements, kernel: Kernel) -> tuple[Array,
     return best.copy(), outcome.copy(), sd
 
 
+@compiled_for(LISTS, TABLE, NUMBERS, MOVEMENTS, KERNEL)
+def uncertainty(alike: np.ndarray, goals: Array, context: Array, known: Movements, kernel: Kernel) -> Array:
+    """Standard deviation ``(n,)``, without noise, of the outcome of a movement to each of ``goals``: the end of steps
+    from one start, by the process of the movements most like it.
+
+    Args:
+        alike: ``(n, k)``, rows of the movements most like each start, the start first.
+        goals: ``(n, outcome_dim)``.
+        context, known, kernel: see `answer`.
+    """
+    n, k = alike.shape
+    sds, covariance, slope = np.empty(n), np.empty(k), np.empty(k)
+    for i in range(n):
+        rows = alike[i]
+        process = process_of(as_columns(known.inputs, rows), as_columns(known.outcomes, rows), kernel)
+        question = Question(context, goals[i], rows, alike, rows, context)
+        _, theta = descend(process, known.thetas[rows[0]], question, known, float(goals.shape[1]))
+        covariances(process.inputs, kernel, in_lengths(theta, context, known.units), covariance, slope)
+        sds[i] = np.sqrt(variance_at(process, covariance))
+    return sds
+
+
 @compiled_for(TABLE, TABLE, ROWS, KERNEL)
 def gross_errors(inputs: Array, outcomes: Array, rows: np.ndarray, kernel: Kernel) -> np.ndarray:
     """Whether each movement in ``rows`` is a gross error, see `fitted_process`."""
     return fitted_process(rows, inputs, outcomes, kernel)[0].noises > kernel.noise
+
+
+@compiled_for(TABLE, TABLE, KERNEL)
+def left_out(inputs: Array, outcomes: Array, kernel: Kernel) -> Array:
+    """Squared errors ``(n,)`` of predicting each of some movements from all others, eq. (5.12) of Rasmussen & Williams.
+
+    Args:
+        inputs, outcomes: ``(n, dim)``, in lengths, and ``(n, outcome_dim)``.
+        kernel: kernel.
+    """
+    process, precision = fitted_process(np.arange(len(inputs)), inputs, outcomes, kernel)
+    errors = np.zeros(len(inputs))
+    for weights in process.weights:
+        errors += (weights / precision) ** 2
+    return errors
 
 
 @compiled_for(TABLE, TABLE, LISTS, TABLE, KERNEL)

@@ -1,9 +1,9 @@
 """Local Gaussian process as inverse model; the answer is the candidate with the least expected error.
 
 Our addition, not in the paper. Each of the exemplars nearest to the goal has a process of its own, fitted to the
-movements most like it. Candidates are these exemplars, the ends of Gauss-Newton steps from them, and the answer of
-`LocallyLinear`. Each candidate has an expected squared error, variance and noise included. Where a process predicts the
-exemplars most like its own badly, both are inflated.
+movements most like it; those that are much alike share one. Candidates are these exemplars, the ends of Gauss-Newton
+steps from them, and the answer of a linear regression. Each candidate has an expected squared error, variance and noise
+included. Where a process predicts the exemplars most like its own badly, both are inflated.
     inverse = LocalProcess(problem); estimate = inverse(context, goal)
 """
 
@@ -14,12 +14,12 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from sgimd_torch.inverses.gaussian_process import choose_kernel, fit_lengths, one_thread
-from sgimd_torch.inverses.locally_linear import NEAR, LocallyLinear
+from sgimd_torch.inverses.locally_linear import ALIKE, corrected
 from sgimd_torch.inverses.nearest import near_goal
 from sgimd_torch.inverses.tuples import Kernel, Movements, Predictions, Question
+from sgimd_torch.memory import Neighbours, Rows
 from sgimd_torch.memory.compiled import compiled
 from sgimd_torch.memory.growing import Growing
-from sgimd_torch.memory.neighbours import Neighbours, Rows
 from sgimd_torch.parts import Inverse, Problem
 from sgimd_torch.spaces import Array, Estimate, read_only, stream
 
@@ -29,6 +29,10 @@ _FITTED: Final = 300  # number of exemplars, drawn from all, to which lengths ar
 _GROUPS: Final = 8  # number of groups of neighbours that determine the kernel
 _GROUP: Final = 60  # number of exemplars in each group
 _MOST_ALIKE: Final = 100  # number of exemplars to which a process is fitted
+_NEAR: Final = 10  # number of exemplars in an estimate
+_STARTS: Final = 6  # number of exemplars where steps begin
+_SHARED: Final = 30  # a start among so many movements most like an earlier start shares its process
+_FEW_ALIKE: Final = 40  # number of exemplars that say how unsure an answer would be
 _LITTLE: Final = 1e-3  # least variance of the noise when gross errors are looked for, relative to that of outcomes
 _FAR: Final = 1e3  # distance from 0, in standard deviations, beyond which inputs are shifted to 0 against rounding
 
@@ -62,36 +66,50 @@ class LocalProcess(Inverse):
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)
         self.memory, self.noise = problem.memory, problem.outcome_noise
-        self._linear = LocallyLinear(problem)
         self._due = float(_FIRST)  # exemplars at the next fit
         self._kernel: Kernel | None = None  # None while all outcomes are equal
-        self._answered: tuple[int, dict[bytes, Estimate]] = 0, {}  # answers by context and goal, at this many exemplars
 
     def __call__(self, context: Array, goal: Array) -> Estimate:
-        """The answer, and the exemplars of the nearest outcomes, nearest first. A goal model may have asked before."""
+        """The answer, and the exemplars of the nearest outcomes, nearest first."""
         context, goal = (np.ascontiguousarray(point, dtype=np.float64) for point in (context, goal))
-        if self._answered[0] != len(self.memory):
-            self._answered = len(self.memory), {}
-        answered, question = self._answered[1], context.tobytes() + goal.tobytes()
-        if question not in answered:
-            answered[question] = self._answer(context, goal)
-        return answered[question]
-
-    def _answer(self, context: Array, goal: Array) -> Estimate:
         memory = self.memory
         self._catch_up()
-        near = near_goal(memory, context, goal, NEAR)
+        near = near_goal(memory, context, goal, _NEAR)
         thetas = memory.thetas[near]
         if self._kernel is None:
             return Estimate(thetas[0], thetas, memory.outcomes[near], context)
-        linear, _ = self._linear.correct(near, goal)
-        inputs, kernels = self._inputs.keys.rows, compiled("sgimd_torch.inverses.kernels")
-        alike = self._inputs.nearest(inputs[near[: kernels.STARTS]], _MOST_ALIKE)
-        question = Question(*map(read_only, (context, goal, alike, linear)))
-        units = self._units, self._spreads, read_only(memory.theta_range)
-        known = Movements(inputs, memory.thetas, memory.outcomes, *units)
+        known, kernels = self._known(), compiled("sgimd_torch.inverses.kernels")
+        starts = near[:_STARTS]
+        alike, process_of = self._alike(starts)
+        linear, _ = corrected(memory, alike[:, :ALIKE].copy(), goal)
+        question = Question(*map(read_only, (context, goal, starts, alike, process_of, linear)))
         theta, expected, sd = kernels.answer(question, known, self._kernel)
         return Estimate(theta, thetas, memory.outcomes[near], context, expected, sd)
+
+    def uncertainty(self, context: Array, goals: Array) -> Array:
+        """Standard deviations ``(n,)`` of the outcomes of answers, without noise, from fewer movements than answers."""
+        self._catch_up()
+        if self._kernel is None:
+            return np.zeros(len(goals))
+        known, kernels = self._known(), compiled("sgimd_torch.inverses.kernels")
+        starts = self.memory.near_each(context, goals)
+        alike = self._inputs.nearest(known.inputs[starts], _FEW_ALIKE)
+        sds: Array = kernels.uncertainty(*map(read_only, (alike, goals, context)), known, self._kernel)
+        return sds
+
+    def _alike(self, starts: Rows) -> tuple[Rows, Rows]:
+        """Rows ``(processes, k)`` of the movements most like some starts, and the process of each start. A start
+        that is much like an earlier one shares its process."""
+        inputs, lists, process_of = self._inputs.keys.rows, list[Rows](), list[int]()
+        for row in starts:
+            if not lists or (len(lists[-1]) < len(inputs) and row not in lists[-1][:_SHARED]):
+                lists.append(self._inputs.nearest(inputs[row : row + 1], _MOST_ALIKE)[0])
+            process_of.append(len(lists) - 1)
+        return np.stack(lists), np.array(process_of)
+
+    def _known(self) -> Movements:
+        memory, units = self.memory, (self._units, self._spreads, read_only(self.memory.theta_range))
+        return Movements(self._inputs.keys.rows, memory.thetas, memory.outcomes, *units)
 
     def predict(self, context: Array, theta: Array) -> Array | None:
         """Expected outcome ``(outcome_dim,)``, from similar movements; None while there are too few exemplars."""
@@ -144,7 +162,7 @@ class LocalProcess(Inverse):
         for last in (False, True):  # at last without gross errors
             drawn = order[:_FITTED]
             self._units = read_only(np.stack((origin, self._spreads * fit_lengths(standard[drawn], outcomes[drawn]))))
-            self._inputs = Neighbours(Growing(unscaled.shape[1], self._scaled(0)[:n]))
+            self._inputs = self.memory.index(Growing(unscaled.shape[1], self._scaled(0)[:n]))
             inputs = self._inputs.keys.rows
             groups = [rows[~np.isin(rows, gross)] for rows in self._inputs.nearest(inputs[order[:_GROUPS]], _GROUP)]
             if last or not len(gross := np.concatenate([self._gross(outcomes, rows) for rows in groups])):

@@ -11,13 +11,13 @@ from typing import Final
 import numpy as np
 
 from sgimd_torch.inverses.nearest import near_goal
-from sgimd_torch.memory import Rows
+from sgimd_torch.memory import Memory, Rows
 from sgimd_torch.memory.compiled import compiled
 from sgimd_torch.parts import Inverse, Problem
 from sgimd_torch.spaces import Array, Estimate
 
 NEAR: Final = 10  # number of nearest outcomes that are compared, eq. (8)
-_ALIKE: Final = 20  # largest number of exemplars in a neighbourhood; a slope needs more than the mean of `LocalInverse`
+ALIKE: Final = 20  # largest number of exemplars in a neighbourhood; a slope needs more than the mean of `LocalInverse`
 
 
 class LocallyLinear(Inverse):
@@ -45,14 +45,13 @@ class LocallyLinear(Inverse):
             RuntimeError: the memory is empty.
         """
         memory, goal = self._memory, np.ascontiguousarray(goal, dtype=np.float64)
-        theta, rows = self.correct(near_goal(memory, context, goal, NEAR), goal)
+        near = near_goal(memory, context, goal, NEAR)
+        theta, rows = corrected(memory, memory.neighbourhoods(near, ALIKE, self._radius), goal)
         return Estimate(theta, memory.thetas[rows], memory.outcomes[rows], context)
 
-    def correct(self, near: Rows, goal: Array) -> tuple[Array, Rows]:
-        """The corrected theta_g and the rows of K_best, from the rows ``near`` of the outcomes nearest to the goal."""
-        memory = self._memory
-        alike = memory.neighbourhoods(near, _ALIKE, self._radius)
-        kernels = compiled("sgimd_torch.inverses.linear_kernel")
-        theta = np.empty(memory.theta_dim)
-        best = kernels.locally_linear(alike, memory.thetas, memory.outcomes, goal, memory.theta_range, theta)
-        return theta, alike[best][alike[best] >= 0]
+
+def corrected(memory: Memory, alike: Rows, goal: Array) -> tuple[Array, Rows]:
+    """The corrected theta_g and the rows of K_best, from neighbourhoods ``(h, k)``, -1 where they are fewer."""
+    kernels, theta = compiled("sgimd_torch.inverses.linear_kernel"), np.empty(memory.theta_dim)
+    best = kernels.locally_linear(alike, memory.thetas, memory.outcomes, goal, memory.theta_range, theta)
+    return theta, alike[best][alike[best] >= 0]

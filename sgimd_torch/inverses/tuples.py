@@ -44,13 +44,17 @@ class Question(NamedTuple):
     Attributes:
         context: ``(context_dim,)``.
         goal: ``(outcome_dim,)``.
-        alike: ``(starts, k)``, rows of the movements most like each start, the start itself first.
-        linear: ``(theta_dim,)``, answer of `LocallyLinear`.
+        starts: ``(starts,)``, rows of the movements at which steps begin.
+        alike: ``(processes, k)``, rows of the movements of each process, the one most like a start first.
+        process_of: ``(starts,)``, process of each start, in the order of the starts.
+        linear: ``(theta_dim,)``, answer by linear regression.
     """
 
     context: Array
     goal: Array
+    starts: np.ndarray
     alike: np.ndarray
+    process_of: np.ndarray
     linear: Array
 
 

@@ -7,24 +7,39 @@ of eq. 8), and `near_policies` finds movements similar to a given movement (K_h 
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Callable
+from copy import copy
+from typing import Final, Protocol, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from sgimd_torch.memory.growing import Growing
-from sgimd_torch.memory.neighbours import Neighbours, Rows
-from sgimd_torch.spaces import Array, check_point
+from sgimd_torch.memory.neighbours import Flat, Graph, Rows, Scan
+from sgimd_torch.spaces import Array, check_point, stream
 
-__all__ = ["Memory", "Rows"]
+__all__ = ["FlatMemory", "Memory", "Neighbours", "Rows", "ScanMemory"]
 
+_TRIED: Final = 40  # number of exemplars with which a memory of a user's is tried
+_ASKED: Final = 10  # number of neighbours asked of it
 _NO_CONTEXT: Final = "an environment without contexts gives np.zeros(0)"
 
 
-class Memory:
-    """Exemplars in the order in which they were added; the row number of an exemplar never changes.
+class Neighbours(Protocol):
+    """Neighbours among the rows of a growing table, ``keys``."""
 
-    In distances, one unit of context counts as much as one unit of outcome or theta.
+    keys: Growing
+
+    def nearest(self, queries: Array, k: int, within: float = ...) -> Rows:
+        """See `neighbours.Scan.nearest`."""
+
+
+class Memory:
+    """Flat index of faiss; of more than some 10^4 exemplars a graph (HNSW), which finds nearly all neighbours.
+
+    Exemplars keep the order in which they were added; the row number of an exemplar never changes. In distances, one
+    unit of context counts as much as one unit of outcome or theta. A subclass may have another `index`, by which
+    inverse models, too, find similar movements.
 
     Args:
         context_dim: dimension of C; 0 if there are no contexts, as in the fishing task.
@@ -41,11 +56,19 @@ class Memory:
                 f"got {context_dim}, {theta_dim} and {outcome_dim}"
             )
         self.context_dim, self.theta_dim, self.outcome_dim = context_dim, theta_dim, outcome_dim
-        self._contexts, self._thetas, self._outcomes = Growing(context_dim), Growing(theta_dim), Growing(outcome_dim)
+        self._begin()
+
+    def _begin(self) -> None:
+        dims = self.context_dim, self.theta_dim, self.outcome_dim
+        self._contexts, self._thetas, self._outcomes = map(Growing, dims)
         # A key is a context followed by an outcome or by a theta; without contexts, outcomes and thetas are the keys.
-        self._by_outcome = Neighbours(Growing(context_dim + outcome_dim) if context_dim else self._outcomes)
-        self._by_theta = Neighbours(Growing(context_dim + theta_dim) if context_dim else self._thetas)
-        self._range = np.stack((np.full(theta_dim, np.inf), np.full(theta_dim, -np.inf)))
+        self._by_outcome = self.index(Growing(dims[0] + dims[2]) if dims[0] else self._outcomes)
+        self._by_theta = self.index(Growing(dims[0] + dims[1]) if dims[0] else self._thetas)
+        self._range = np.stack((np.full(dims[1], np.inf), np.full(dims[1], -np.inf)))
+
+    def index(self, keys: Growing) -> Neighbours:
+        """Neighbours among the rows of a growing table, here and for inverse models."""
+        return Graph(keys)
 
     def __len__(self) -> int:
         return len(self._thetas)
@@ -95,14 +118,16 @@ class Memory:
         """Rows ``(min(k, n),)`` whose contexts and outcomes lie nearest to ``context`` and ``goal`` ``(outcome_dim,)``,
         nearest first; of equally near rows, the oldest first."""
         goal = check_point("goal", goal, self.outcome_dim, "was a theta passed instead?")
-        return self._by_outcome.nearest_to(self._key(context, goal), k)
+        return self._by_outcome.nearest(self._key(context, goal)[None], k)[0]
+
+    def near_each(self, context: Array, goals: Array) -> Rows:
+        """Row of the exemplar whose context and outcome lie nearest to ``context`` and each of ``goals``, ``(n,)``."""
+        keys = np.concatenate((np.tile(context, (len(goals), 1)), goals), axis=1) if self.context_dim else goals
+        return self._by_outcome.nearest(keys, 1)[:, 0]
 
     def near_policies(self, context: ArrayLike, theta: ArrayLike, k: int, within: float = np.inf) -> Rows:
         """At most ``k`` rows whose contexts and thetas lie nearest to ``context`` and ``theta`` ``(theta_dim,)``, not
-        farther than ``within``.
-
-        With more than ``EXACT_UP_TO`` exemplars in memory some of these rows may be missing, see `Neighbours`.
-        """
+        farther than ``within``."""
         theta = check_point("theta", theta, self.theta_dim, "was a goal passed instead?")
         (rows,) = self._by_theta.nearest(self._key(context, theta)[None], k, within)
         return rows[rows >= 0]
@@ -110,23 +135,18 @@ class Memory:
     def neighbourhoods(self, rows: Rows, k: int, within: float = np.inf) -> Rows:
         """Result of :meth:`near_policies` for the context and theta of each of ``rows``, ``(len(rows), min(k, n))``,
         with -1 where there are fewer; a row is its own neighbour."""
-        return self._by_theta.around(rows, k, within)
+        return self._by_theta.nearest(self._by_theta.keys.rows[rows], k, within)
 
-    def copy_for(self, dims: tuple[int, int, int]) -> Memory:
-        """A copy for a learner with these dimensions.
-
-        Raises:
-            ValueError: the memory has other dimensions of context, theta or outcome.
-        """
-        own = self.context_dim, self.theta_dim, self.outcome_dim
-        if own != dims:
-            raise ValueError(f"a memory to start from must have dims {dims} of context, theta, outcome, got {own}")
-        return self.copy()
-
-    def copy(self) -> Memory:
+    def copy(self) -> Self:
         """A memory with copies of the exemplars."""
-        memory = Memory(self.context_dim, self.theta_dim, self.outcome_dim)
+        memory = self.empty()
         memory.extend(self.contexts, self.thetas, self.outcomes)
+        return memory
+
+    def empty(self) -> Self:
+        """A memory of the same kind, without exemplars."""
+        memory = copy(self)
+        memory._begin()
         return memory
 
     def extend(self, contexts: Array, thetas: Array, outcomes: Array) -> None:
@@ -143,3 +163,68 @@ class Memory:
     def _key(self, context: ArrayLike, point: Array) -> Array:
         context = check_point("context", context, self.context_dim, _NO_CONTEXT)
         return np.concatenate((context, point)) if self.context_dim else point.copy()
+
+
+class FlatMemory(Memory):
+    """Flat index of faiss, however many exemplars there are."""
+
+    def index(self, keys: Growing) -> Neighbours:
+        """See `Memory.index`."""
+        return Flat(keys)
+
+
+class ScanMemory(Memory):
+    """Comparison with every exemplar in double precision, without faiss."""
+
+    def index(self, keys: Growing) -> Neighbours:
+        """See `Memory.index`."""
+        return Scan(keys)
+
+
+MakeMemory: TypeAlias = Callable[[int, int, int], Memory]
+
+
+def memory_for(memory: Memory | MakeMemory, dims: tuple[int, int, int]) -> Memory:
+    """A memory for a learner with these dimensions: a new one, or a copy of a ``memory`` to start from.
+
+    Raises:
+        ValueError: the memory has other dimensions, or a memory of a user's does not find the nearest rows.
+    """
+    if not isinstance(memory, Memory):
+        memory = memory(*dims)
+        if not isinstance(memory, Memory):
+            raise ValueError(f"a memory must derive from Memory, got a {type(memory).__name__}")
+    own = memory.context_dim, memory.theta_dim, memory.outcome_dim
+    if own != dims:
+        raise ValueError(f"a memory to start from must have dims {dims} of context, theta, outcome, got {own}")
+    if type(memory) not in (Memory, FlatMemory, ScanMemory):
+        _check(memory)
+    return memory.copy()
+
+
+def _check(memory: Memory) -> None:
+    """Refuse a memory of a user's that answers a few questions wrongly.
+
+    Raises:
+        ValueError: it does not find rows that exist, as many as asked, nearest first.
+    """
+    rng, trial, dims = stream(0, "check of a memory"), memory.empty(), (memory.context_dim, memory.theta_dim)
+    contexts, thetas, outcomes = (rng.random((_TRIED, dim)) for dim in (*dims, memory.outcome_dim))
+    trial.extend(contexts, thetas, outcomes)
+    by_outcome, by_theta = np.hstack((contexts, outcomes)), np.hstack((contexts, thetas))
+    asked = {
+        "near_outcomes": (trial.near_outcomes(contexts[0], outcomes[0], _ASKED), by_outcome),
+        "near_policies": (trial.near_policies(contexts[0], thetas[0], _ASKED), by_theta),
+        "neighbourhoods": (trial.neighbourhoods(np.zeros(1, np.int64), _ASKED)[0], by_theta),
+        "index": (trial.index(Growing(by_theta.shape[1], by_theta)).nearest(by_theta[:1], _ASKED)[0], by_theta),
+    }
+    for method, (rows, keys) in asked.items():
+        what = (
+            f"memory {type(memory).__name__}: of {_TRIED} exemplars, {method} gave the rows {np.asarray(rows).tolist()}"
+        )
+        if len(rows) < _ASKED:
+            raise ValueError(f"{what}, which are fewer than the {_ASKED} asked for")
+        if min(rows) < 0 or max(rows) >= _TRIED:
+            raise ValueError(f"{what}, of which some do not exist")
+        if (np.diff(np.linalg.norm(keys[rows] - keys[0], axis=1)) < 0).any():
+            raise ValueError(f"{what}, which are not in order; the nearest must come first")

@@ -21,7 +21,7 @@ from types import ModuleType
 from typing import Any, Final
 
 # All files with compiled functions; changes of a file that is missing here would not change the checksum.
-MODULES: Final = ("memory.jit", "memory.scan", "inverses.tuples", "inverses.linear_kernel", "inverses.kernels")
+MODULES: Final = ("memory.jit", "memory.ordered", "inverses.tuples", "inverses.linear_kernel", "inverses.kernels")
 _PACKAGE: Final = Path(__file__).parents[1]
 
 

@@ -31,9 +31,8 @@ class Exemplars(NamedTuple):
         """These exemplars, then the others."""
         return Exemplars(*map(np.concatenate, zip(self, others, strict=True)))
 
-    @property
-    def memory(self) -> Memory:
-        """A memory of these exemplars."""
-        memory = Memory(*(table.shape[1] for table in self))
+    def memory_like(self, other: Memory) -> Memory:
+        """A memory of these exemplars, of the same kind as the ``other``."""
+        memory = other.empty()
         memory.extend(*self)
         return memory

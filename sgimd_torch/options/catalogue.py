@@ -45,6 +45,7 @@ inverse      inverses.among_effects     among-effects=AmongEffects
 inverse      forward_model.proved       model=ProvedModel
 inverse      forward_model.inverse      model-alone=ModelAlone
 network      forward_model.networks     perceptrons=Perceptrons
+memory       memory                     flat=FlatMemory graph=Memory scan=ScanMemory
 judge        competence                 memory=Competence attempt=AttemptCompetence
 social       strategies                 imitate=Imitate emulate=Emulate
 watch        algorithms                 none=nobody

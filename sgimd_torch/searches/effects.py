@@ -54,7 +54,7 @@ class Effects:
         n = len(self.memory)
         while int(self._due) <= n:
             self._plateau = self._find_plateau(int(self._due))
-            self._due, self._effective, self._seen = self._due * _GROWTH, Exemplars.of(self.memory, slice(0)).memory, 0
+            self._due, self._effective, self._seen = self._due * _GROWTH, self.memory.empty(), 0
         if self._plateau is None:
             return None
         distances = self._distances(self._plateau, slice(self._seen, n))

@@ -12,9 +12,9 @@ import sgimd_torch
 
 PROGRAM = """
 import numpy as np
-from sgimd_torch.memory.neighbours import Neighbours
+from sgimd_torch.memory.neighbours import Flat
 from sgimd_torch.memory.growing import Growing
-side = Neighbours(Growing(1, np.arange(5.0)[:, None]))
+side = Flat(Growing(1, np.arange(5.0)[:, None]))
 print(*side.nearest(np.array([[3.2]]), 2)[0])
 """
 LIFE = """
@@ -81,7 +81,7 @@ def squared_length(point):
 CALL = """
 import numpy as np
 from sgimd_torch.memory.compiled import compiled
-print(compiled("sgimd_torch.memory.scan").squared_length(np.array([3.0])))
+print(compiled("sgimd_torch.memory.ordered").squared_length(np.array([3.0])))
 """
 
 
@@ -93,7 +93,7 @@ compiled("sgimd_torch.nothing")
 
 def test_a_damaged_cache_is_made_again_and_a_change_of_what_compiled_code_calls_takes_effect(package, tmp_path):
     mine = {"NUMBA_CACHE_DIR": str(tmp_path / "mine")}
-    (package / "memory" / "scan.py").write_text(CALLING)  # compiled in a moment
+    (package / "memory" / "ordered.py").write_text(CALLING)  # compiled in a moment
     assert started(package, CALL, **mine).communicate() == ("9.0\n", SAID)
     (path,) = (tmp_path / "mine").rglob("*.nbc")
     path.write_bytes(path.read_bytes()[:100])

@@ -1,4 +1,4 @@
-"""Neighbours: those of sorted distances, ties to the oldest, whatever was asked before; above a size nearly all."""
+"""Neighbours: those of sorted distances, ties to the oldest, whatever was asked before; in a graph nearly all."""
 
 import copy
 import pickle
@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from sgimd_torch.competence import Competence
 from sgimd_torch.memory import Memory
 from sgimd_torch.memory.growing import Growing
-from sgimd_torch.memory.neighbours import EXACT_UP_TO, LISTED, Neighbours
+from sgimd_torch.memory.neighbours import Flat, Graph, Scan
 from sgimd_torch.spaces import Array, Box, stream
 from worlds import problem
 
@@ -22,13 +22,12 @@ def nearest(rows: Array, query: Array, k: int) -> list[int]:
     return [int(row) for row in np.square(rows - query).sum(axis=1).argsort(kind="stable")[:k]]
 
 
-def assert_nearest(near: Array, rows: Array, query: Array, k: int) -> None:
-    """The rows are those of the oracle; equally near rows are in its order, unless rounding makes the difference."""
+def assert_nearest(near: Array, rows: Array, query: Array, k: int, make: type) -> None:
+    """The rows are those of the oracle; of nearly equally near ones, faiss may find others."""
     distances, expected = np.square(rows - query).sum(axis=1), nearest(rows, query, k)
     assert len({*near.tolist()}) == len(expected)
-    np.testing.assert_allclose(distances[near], distances[expected], rtol=1e-12)
-    if (rows * 2.0**24 % 1 == 0).all() and (query * 2.0**24 % 1 == 0).all() and np.ptp(rows) < 4:  # nothing is rounded
-        assert near.tolist() == expected
+    np.testing.assert_allclose(distances[near], distances[expected], rtol=1e-12 if make is Scan else 2e-6)
+    assert (np.diff(distances[near]) >= -1e-12 * distances[near][1:]).all()
 
 
 def structured(n: int, dim: int, seed: int = 0) -> Array:
@@ -52,12 +51,16 @@ TABLES = {  # what single precision could confuse
 
 @settings(deadline=None, max_examples=60)
 @given(
-    st.sampled_from(sorted(TABLES)), st.integers(1, 9), st.lists(st.integers(1, 400), min_size=1, max_size=4), st.data()
+    st.sampled_from([Flat, Graph, Scan]),
+    st.sampled_from(sorted(TABLES)),
+    st.integers(1, 9),
+    st.lists(st.integers(1, 400), min_size=1, max_size=4),
+    st.data(),
 )
-def test_neighbours_are_those_of_sorted_distances_while_the_table_grows(kind, dim, steps, data):
+def test_neighbours_are_those_of_sorted_distances_while_the_table_grows(make, kind, dim, steps, data):
     rng = stream(data.draw(st.integers(0, 99)), kind)
     rows = TABLES[kind](rng, sum(steps), dim)
-    side, n = Neighbours(Growing(dim)), 0
+    side, n = make(Growing(dim)), 0
     for step in steps:
         side.keys.append(rows[n : n + step])
         n += step
@@ -65,69 +68,61 @@ def test_neighbours_are_those_of_sorted_distances_while_the_table_grows(kind, di
         asked = rng.integers(0, n, 4)
         queries = np.concatenate((rows[asked], rng.normal(size=(2, dim)), 1e6 * rng.normal(size=(1, dim))))
         for query, near in zip(queries, side.nearest(queries, k), strict=True):
-            assert_nearest(near, rows[:n], query, k)
+            assert_nearest(near, rows[:n], query, k, make)
         within = float(np.median(np.abs(rows)))
-        for row, near in zip(asked, side.around(asked, k, within), strict=True):
+        for row, near in zip(asked, side.nearest(rows[asked], k, within), strict=True):
             count = int((near >= 0).sum())
             assert (near[count:] == -1).all()
-            assert_nearest(near[:count], rows[:n], rows[row], count)
+            assert_nearest(near[:count], rows[:n], rows[row], count, make)
             assert count == min(k, (np.square(rows[:n] - rows[row]).sum(axis=1) <= within**2).sum())
 
 
-@pytest.mark.parametrize("n", [20_000, EXACT_UP_TO])
-def test_many_rows_are_searched_exactly(n):
-    rows = structured(n, 3)
-    side = Neighbours(Growing(3, rows))
-    for query in (rows[7], np.zeros(3), np.full(3, 0.5), np.full(3, 1e9)):
-        assert side.nearest(query[None], 40)[0].tolist() == nearest(rows, query, 40)
-
-
 def test_rows_added_later_count_whatever_k_was_before():
-    rows, side = np.append(0, 1 / np.arange(1.0, 60.0))[:, None], Neighbours(Growing(1))  # each is nearer to the first
+    rows, side = np.append(0, 1 / np.arange(1.0, 60.0))[:, None], Flat(Growing(1))  # each is nearer to the first
     for n in range(1, 61):
         side.keys.append(rows[n - 1 : n])
         for k in (1, 40, 5):
-            assert side.around(np.zeros(1, int), k)[0].tolist() == nearest(rows[:n], rows[0], k)
+            assert side.nearest(np.zeros((1, 1)), k)[0].tolist() == nearest(rows[:n], rows[0], k)
 
 
 @pytest.fixture(scope="module")
 def many():
-    """More rows than are searched exactly."""
-    return Neighbours(Growing(10, structured(EXACT_UP_TO + 50_000, 10)))
+    """Rows in a graph, and some that are not in it yet."""
+    side = Graph(Growing(10, structured(24_300, 10)))
+    assert len(side.keys) > side.flat_up_to + 1000
+    return side
 
 
-def test_above_it_nearly_all_are_found_nearest_first_and_within_the_radius(many):
+def test_a_graph_finds_nearly_all_nearest_first_and_within_the_radius(many):
     rows = many.keys.rows
-    asked = np.arange(0, len(rows), 1500)
+    asked = np.append(np.arange(0, len(rows), 300), len(rows) - 1)
     hits = 0
     for row, near in zip(asked, many.nearest(rows[asked], 10), strict=True):
         assert near[0] == row
         assert (np.diff(np.square(rows[near] - rows[row]).sum(axis=1)) >= 0).all()
         hits += len({*near.tolist()} & {*nearest(rows, rows[row], 10)})
-    assert hits >= 0.95 * 10 * len(asked)
-    for row, near in zip(asked[:20], many.around(asked[:20], 10, within=0.3), strict=True):
+    assert 0.95 * 10 * len(asked) <= hits
+    for row, near in zip(asked[:20], many.nearest(rows[asked[:20]], 10, within=0.3), strict=True):
         assert (np.square(rows[near[near >= 0]] - rows[row]).sum(axis=1) <= 0.3**2).all()
         assert near[0] == row
 
 
-def test_above_it_results_depend_on_the_rows_alone_not_on_when_they_were_added(many):
-    rows, grown = many.keys.rows, Neighbours(Growing(10))
-    for start in range(0, len(rows), 47_000):
-        grown.keys.append(rows[start : start + 47_000])
+def test_a_graph_depends_on_the_rows_alone_not_on_when_they_were_added(many):
+    rows, grown = many.keys.rows, Graph(Growing(10))
+    for start in range(0, len(rows), 7_700):
+        grown.keys.append(rows[start : start + 7_700])
         grown.nearest(rows[:2], 3)
-    queries = np.concatenate((rows[::4000], np.full((1, 10), 1e70)))
+    queries = np.concatenate((rows[::400], np.full((1, 10), 1e70)))
     assert np.array_equal(many.nearest(queries, 20, 0.4), grown.nearest(queries, 20, 0.4))
 
 
 def test_threads_that_ask_at_once_get_what_one_gets():
     rows = structured(3000, 5)
-    asked = [np.arange(start, start + 20) for start in range(0, 2000, 13)]
-    expected = [Neighbours(Growing(5, rows)).around(some, LISTED).tolist() for some in asked[:3]]
-    side = Neighbours(Growing(5, rows))
+    asked = [rows[start : start + 20] for start in range(0, 2000, 13)]
+    alone, side = Flat(Growing(5, rows)), Flat(Growing(5, rows))
     with ThreadPoolExecutor(4) as pool:
-        together = [near.tolist() for near in pool.map(lambda some: side.around(some, LISTED), asked)]
-    assert together[:3] == expected
-    assert together == [side.around(some, LISTED).tolist() for some in asked]
+        together = [near.tolist() for near in pool.map(lambda some: side.nearest(some, 20), asked)]
+    assert together == [alone.nearest(some, 20).tolist() for some in asked]
 
 
 @pytest.mark.parametrize("copied", [copy.deepcopy, lambda memory: pickle.loads(pickle.dumps(memory))])

@@ -39,7 +39,7 @@ LIBRARIES = {  # rooms or single files that may import a library, by library
     "scipy": {*ROW.keys() - {"spaces"}, "extras"},
     "lazy_loader": {"__init__"},
     "faiss": {"memory/neighbours"},
-    "numba": {"memory/compiled", "memory/scan", "memory/jit", "inverses/kernels"},
+    "numba": {"memory/compiled", "memory/ordered", "memory/jit", "inverses/kernels"},
     "mujoco": {"environments/rod_physics", "extras/models", "extras/film", "extras/teach"},
     "mujoco_menagerie": {"extras/models/file"},
     "torch": {"forward_model"},

@@ -19,7 +19,7 @@ from sgimd_torch.extras.asking.interest import AUTONOMOUS, StrategicInterest
 from sgimd_torch.extras.asking.strategy import Asking, StrategicBabbling
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Correspondence, Learner
-from sgimd_torch.memory import Memory
+from sgimd_torch.memory import MakeMemory, Memory
 from sgimd_torch.parts import Demonstrator, Problem
 from sgimd_torch.searches.explore import Anywhere
 from sgimd_torch.searches.simplex import NelderMead
@@ -50,7 +50,7 @@ def sgim_acts(
     epsilon: float = 0.0,
     emulates: bool = True,
     inverse: MakeInverse = LocalProcess,
-    memory: Memory | None = None,
+    memory: Memory | MakeMemory = Memory,
     **parts: Any,
 ) -> Learner:
     """SGIM-ACTS: practice that chooses when, whom and what to ask, and how to use the answer.
@@ -68,7 +68,7 @@ def sgim_acts(
         emulates: whether emulation is a choice beside imitation. It matters only with a budget above 1, because
             emulation by one movement would be an autonomous attempt.
         inverse: inverse model; searches begin at its answer.
-        memory: exemplars to start from; None: the memory starts empty.
+        memory: memory, or exemplars to start from.
         parts: options of `GoalBabbling`; the goal model must be a `StrategicGoals`.
     """
     problem = Problem(environment, seed, memory, inverse=inverse)

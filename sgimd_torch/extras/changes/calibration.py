@@ -19,6 +19,7 @@ _PRIOR_A: Final = 0.2  # prior standard deviation of a
 _PRIOR_B: Final = 0.1  # prior standard deviation of b, in sides of Pi
 _PRIOR_G: Final = 0.1  # prior standard deviation of G, in spreads of the outcomes
 _STEPS: Final = 10  # largest number of Gauss-Newton steps
+_REWEIGHTED: Final = 3  # number of least squares fits of a linear calibration
 _TRIES: Final = 5  # largest number of dampings that are tried for a step
 _DAMPING: Final = 1e-2  # damping of the first step, relative to the curvature
 _FACTOR: Final = 5.0  # factor by which the damping grows after a step that fails, and falls after one that helps
@@ -107,9 +108,35 @@ class Calibration:
         outcomes_now = outcomes + self.spread * shift + (outcomes - self.mean) @ turn.reshape(self.outcome_dim, -1)
         return np.asarray(outcomes_now)
 
+    def linear_by_halves(self, current: Exemplars, prediction: tuple[Array, Array, Array]) -> Array:
+        """Result of `by_halves` to first order: calibrations are linear in their parameters around those of now, and
+        come from the era's one ``prediction`` of these movements."""
+        predicted, variances, slopes = self._with_slopes(current, self.p, prediction)
+        differences, errors = current.outcomes - predicted, np.empty(len(predicted))
+        for half in (0, 1):
+            fitted, tested = slice(1 - half, None, 2), slice(half, None, 2)
+            by_row, usual_variances = slopes[fitted], np.maximum(variances[fitted], 1e-300)
+            left = differences[fitted]
+            for _ in range(_REWEIGHTED):
+                squares = squared(left)
+                usual = np.median(squares) + usual_variances
+                weighted = by_row / (usual * (1 + squares / (4 * usual)))[:, None, None]
+                flat = weighted.reshape(-1, len(self.p))
+                curvature = by_row.reshape(-1, len(self.p)).T @ flat + np.diag(self.precision)
+                p = np.linalg.solve(curvature, differences[fitted].reshape(-1) @ flat)
+                left = differences[fitted] - by_row @ p
+            errors[tested] = squared(differences[tested] - slopes[tested] @ p)
+        return errors
+
     def _slopes(self, current: Exemplars, p: Array) -> tuple[Array, Array, Array]:
         """Predictions, their variances, and their slopes by the parameters ``(n, outcome_dim, len(p))``."""
-        expected, variances, jacobians = self.era.predict(current._replace(thetas=self._h(current.thetas, p)))
+        return self._with_slopes(current, p, self.era.predict(current._replace(thetas=self._h(current.thetas, p))))
+
+    def _with_slopes(
+        self, current: Exemplars, p: Array, prediction: tuple[Array, Array, Array]
+    ) -> tuple[Array, Array, Array]:
+        """Result of `_slopes`, from the era's ``prediction`` of the translated movements."""
+        expected, variances, jacobians = prediction
         turn = np.eye(self.outcome_dim) + p[2 * self.dim + self.outcome_dim :].reshape(
             self.outcome_dim, self.outcome_dim
         )

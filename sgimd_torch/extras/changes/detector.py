@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from sgimd_torch.extras.changes.calibration import Calibration, by_halves, shifted_by_halves
-from sgimd_torch.extras.changes.eras import NEAR, SURE, Era, better, gains_over, squared
+from sgimd_torch.extras.changes.eras import SURE, Era, better, gains_over, squared
 from sgimd_torch.inverses.gaussian_process import one_thread
 from sgimd_torch.inverses.local_process import LocalProcess, predictions
 from sgimd_torch.memory import Memory, Rows
@@ -24,6 +24,7 @@ from sgimd_torch.parts import Problem
 from sgimd_torch.spaces import Array
 
 _RECENT: Final = 200  # number of last surprises from which the usual surprise is taken
+_PREDICTED_FROM: Final = 40  # number of exemplars from which a movement is predicted
 _SURPRISING: Final = 4.0  # surprise, relative to the usual one, above which a prediction counts for the CUSUM
 _DRIFT: Final = 0.12  # number that the CUSUM loses with each movement
 _SUSPICIOUS: Final = 3.0  # CUSUM from which on a change is suspected
@@ -31,7 +32,7 @@ _FIRST: Final = 50  # least number of exemplars before a change is suspected
 _PREDICTED: Final = 30  # least number of predictions in an era before a change is suspected
 # Numbers of movements since a suspicion at which it is tested.
 _TESTED_AFTER: Final = (16, 24, 36, 54, 81, 122, 182, 273)
-_EVERY: Final = 64  # number of movements between two tests without a suspicion
+_EVERY: Final = 64, 1 / 32  # movements between two tests without a suspicion: at least so many, and this part of all
 _SURE_OF_MANY: Final = 2.5  # statistic T from which on such a test is passed; 1.5 at most where nothing had changed
 _FAILED: Final = 6.0  # squared error, relative to the expected one, above which a prediction has failed
 _TESTED: Final = 128  # largest number of newest movements that are tested
@@ -92,7 +93,7 @@ class ChangeDetector:
         if fitted is None:
             return
         point = ((np.concatenate((theta, context)) - fitted.units[0]) / fitted.units[1])[None]
-        near = fitted.inputs.nearest(point, NEAR)
+        near = fitted.inputs.nearest(point, _PREDICTED_FROM)
         predicted = predictions(fitted.inputs, process.memory.outcomes, near, point, fitted.kernel)
         expected, (variance,), (noise,), _ = predicted
         surprise = float(squared(expected[0] - outcome)) / (len(outcome) * float(variance + noise) + 1e-300)
@@ -128,7 +129,9 @@ class ChangeDetector:
     def _to_test(self, n: int, n_known: int) -> tuple[int, float]:
         """How many of the last movements to test now, and from which statistic T on they are of another era."""
         if self._suspected_at < 0:
-            is_due = n_known >= _KNOWN and n - self.since >= _TESTED and n - self._tested_at >= _EVERY
+            is_due = (
+                n_known >= _KNOWN and n - self.since >= _TESTED and n - self._tested_at >= max(_EVERY[0], _EVERY[1] * n)
+            )
             self._tested_at = n if is_due else self._tested_at
             return _TESTED if is_due else 0, _SURE_OF_MANY
         n_since = n - self._suspected_at
@@ -148,16 +151,20 @@ class ChangeDetector:
             return 0
         rows = np.arange(max(n - n_last, n - _TESTED), n)
         tested, earlier = Exemplars.of(memory, rows), Era(fitted, Exemplars.of(memory, slice(n - n_last)))
-        expected, variances, _ = earlier.predict(tested)
+        expected, variances, _ = prediction = earlier.predict(tested)
         as_it_was, failed = squared(expected - tested.outcomes), variances * _FAILED * memory.outcome_dim
-        # If nothing had changed, both would predict; the first errs more where noise has grown.
-        unchanged = Era(fitted, Exemplars.of(memory)).left_out(rows)[0], as_it_was
-        of_each_other, _ = Era(fitted, tested).left_out(np.arange(len(rows)))
-        calibrated = by_halves(earlier, self.problem.policies, tested)
+        of_each_other, shifted = Era(fitted, tested).left_out_each(), shifted_by_halves(tested.outcomes - expected)
+        calibrated = Calibration(earlier, self.problem.policies).linear_by_halves(tested, prediction)
         subsets = (slice(None), sure), (as_it_was > failed, SURE)  # a local change is seen in those that failed
-        for errors in (of_each_other, calibrated, shifted_by_halves(tested.outcomes - expected)):
+        of_all: Array | None = (
+            None  # if nothing had changed, all others would predict, too; they err more if noise grew
+        )
+        for errors in (of_each_other, calibrated, shifted):
             for some, least in subsets:
-                if all(better(of_one[some], errors[some], self.noise) >= least for of_one in unchanged):
+                if better(as_it_was[some], errors[some], self.noise) < least:
+                    continue
+                of_all = Era(fitted, Exemplars.of(memory)).left_out(rows)[0] if of_all is None else of_all
+                if better(of_all[some], errors[some], self.noise) >= least:
                     # The suspicion may have begun too early: the first movements then fit the old era better.
                     gains = np.zeros(len(rows))
                     gains[some] = gains_over(as_it_was, errors, self.noise)[some]
@@ -192,7 +199,7 @@ class ChangeDetector:
     def _process(self, exemplars: Exemplars, era: Era) -> Era:
         """A process of these exemplars; if they are few, with lengths and kernel of an earlier era."""
         few = len(exemplars.thetas) < _ALONE
-        fitted = None if few else LocalProcess(self.problem.over(exemplars.memory)).fitted()
+        fitted = None if few else LocalProcess(self.problem.over(exemplars.memory_like(self.life))).fitted()
         return Era(fitted or era.fitted, exemplars)
 
     def _helpful(self, era: Era, calibrated: bool, current: Exemplars, tested_rows: Rows) -> Exemplars:

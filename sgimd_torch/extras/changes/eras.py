@@ -11,9 +11,10 @@ import numpy as np
 
 from sgimd_torch.inverses.local_process import FittedKernel, predictions
 from sgimd_torch.memory import Rows
+from sgimd_torch.memory.compiled import compiled
 from sgimd_torch.memory.exemplars import Exemplars
 from sgimd_torch.memory.growing import Growing
-from sgimd_torch.memory.neighbours import Neighbours
+from sgimd_torch.memory.neighbours import Flat
 from sgimd_torch.spaces import Array
 
 NEAR: Final = 60  # largest number of exemplars from which a movement is predicted
@@ -27,7 +28,7 @@ class Era:
     def __init__(self, fitted: FittedKernel, exemplars: Exemplars) -> None:
         self.fitted, self.exemplars = fitted, exemplars
         inputs = self._in_lengths(exemplars)
-        self._neighbours = Neighbours(Growing(inputs.shape[1]))
+        self._neighbours = Flat(Growing(inputs.shape[1]))
         self._neighbours.keys.append(inputs)
 
     def predict(self, movements: Exemplars) -> tuple[Array, Array, Array]:
@@ -47,6 +48,12 @@ class Era:
         itself_last = np.argsort(near == rows[:, None], axis=1, kind="stable")
         expected, variances, _ = self._predict(np.take_along_axis(near, itself_last[:, :-1], axis=1), points)
         return squared(expected - self.exemplars.outcomes[rows]), variances
+
+    def left_out_each(self) -> Array:
+        """Squared errors ``(n,)`` of predicting each of a few exemplars from all others."""
+        kernels, inputs = compiled("sgimd_torch.inverses.kernels"), self._neighbours.keys.rows
+        errors: Array = kernels.left_out(inputs, self.exemplars.outcomes, self.fitted.kernel)
+        return errors
 
     def inflation(self, rows: Rows) -> float:
         """Mean squared error of predicting each of these rows from all others, divided by the expected one."""

@@ -61,7 +61,7 @@ class Changes:
         self._detector: ChangeDetector | None = None
         self._inverse, self._process = learner.inverse, process_of(learner.inverse)
         if prior is not None:
-            learner.memory, learner.begun = Memory(*learner.problem.dims), 0
+            learner.memory, learner.begun = learner.memory.empty(), 0
         self._numbers = [0] * learner.begun  # of each exemplar the number of its movement, or of the last one before it
 
     @property
@@ -99,4 +99,6 @@ class Changes:
 
     def begin_again(self, exemplars: Exemplars, n: int) -> Learner:
         """A learner that begins again with these exemplars, after ``n`` exemplars in all."""
-        return self._begin(int(stream(self._seed, "begin again", n).integers(2**63)), exemplars.memory)
+        return self._begin(
+            int(stream(self._seed, "begin again", n).integers(2**63)), exemplars.memory_like(self._learner.memory)
+        )

@@ -18,6 +18,7 @@ from sgimd_torch.inverses.gaussian_process import one_thread
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Learner
 from sgimd_torch.learner.events import Kind
+from sgimd_torch.memory import Memory
 from sgimd_torch.memory.exemplars import Exemplars
 from sgimd_torch.parts import Problem
 from sgimd_torch.spaces import Array
@@ -51,5 +52,6 @@ def error_knowing_previous(learner: Learner) -> float | None:
 
 def _left_out(problem: Problem, exemplars: Exemplars) -> Array:
     """Squared errors ``(n,)`` of predicting each movement from all others; 0 if all outcomes are equal."""
-    fitted, n = LocalProcess(problem.over(exemplars.memory)).fitted(), len(exemplars.thetas)
+    memory = exemplars.memory_like(Memory(*(table.shape[1] for table in exemplars)))
+    fitted, n = LocalProcess(problem.over(memory)).fitted(), len(exemplars.thetas)
     return np.zeros(n) if fitted is None else Era(fitted, exemplars).left_out(np.arange(n))[0]

@@ -1,6 +1,6 @@
 """The figures of a report: small images, readable at a width of 400 pixels.
 
-A `Variant` is all runs of one configuration, over seeds; a `Section` is a picture of T in the plane of two of its dimensions.
+A `Variant` is all runs of one configuration, over seeds; a `Section` is a picture of T in two of its dimensions.
 source = curves(variants, colours_of(variants))    # a png as a data URL, for <img src=...>
 """
 

@@ -19,7 +19,7 @@ from sgimd_torch.calls import with_keywords_of
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Correspondence, Learner
-from sgimd_torch.memory import Memory
+from sgimd_torch.memory import MakeMemory, Memory
 from sgimd_torch.parts import Problem, Social, Strategy
 from sgimd_torch.spaces import Array, Attempt, Demonstration, Move, check_count
 from sgimd_torch.strategies import Mimic, recording_outcomes
@@ -51,7 +51,7 @@ def quality_diversity(
     imitations: int = 10,
     epsilon: float = 0.05,
     inverse: MakeInverse = LocalProcess,
-    memory: Memory | None = None,
+    memory: Memory | MakeMemory = Memory,
 ) -> Learner:
     """A learner by quality diversity; the algorithms below choose its emitters.
 
@@ -66,7 +66,7 @@ def quality_diversity(
         imitations: number of movements that imitate a demonstration.
         epsilon: largest variation of each parameter in an imitation, in the unit of the parameter.
         inverse: constructor of the inverse model.
-        memory: exemplars to start from, which enter the archive; None: the archive starts empty.
+        memory: memory, or exemplars to start from, which enter the archive.
 
     Raises:
         ValueError: a number is out of its range, or the environment has contexts.
