@@ -84,18 +84,18 @@ board: goals met within a whole tile | board/listener.py | board/test_board.py
     self._benchmark.side / 2) ==> self._benchmark.side)
 index: contexts do not count | memory/__init__.py | memory/test_memory.py
     np.concatenate((contexts, outcomes), axis=1) ==> np.concatenate((0 * contexts, outcomes), axis=1)
-index: of equally near exemplars the newest first | memory/scan.py | memory/test_memory.py
-    distances[position - 1] > distance ==> distances[position - 1] >= distance
-index: the radius is squared once | memory/neighbours.py | memory/test_memory.py
-    np.where(squared <= within * within, rows, -1) ==> np.where(squared <= within, rows, -1)
-index: a list misses the first new row | memory/neighbours.py | memory/test_neighbours.py
-    *_NO_SINGLES, self._compared[rows], rows ==> *_NO_SINGLES, self._compared[rows] + 1, rows
-index: a query that is asked again misses the first new row | memory/neighbours.py | memory/test_neighbours.py
-    np.array([compared]) ==> np.array([compared + 1])
+index: of equally near exemplars the newest first | memory/ordered.py | memory/test_memory.py
+    (distance, row) < (squared ==> (distance, -row) < (squared
+index: the radius is not squared | memory/neighbours.py | memory/test_memory.py
+    k, within * within) ==> k, within)
+index: rows hidden by rounding are not looked for | memory/ordered.py | memory/test_neighbours.py
+    if singles[q, -1] < 0 or others < ==> if singles[q, -1] < 0 or -others > 1 +
+index: the newest rows are missing beside a graph | memory/neighbours.py | memory/test_neighbours.py
+    np.where(newest < 0, -1, newest + first) ==> np.where(newest < 0, -1, newest)
 gross errors: precisions keep what they were | inverses/kernels.py | inverses/test_local_process.py
     precision[j] -= shrinking * column[j] ** 2 ==> precision[j] -= 0 * column[j]
 a Gaussian process with another kernel | inverses/kernels.py | inverses/test_local_process.py
-    5 / 3 * distance**2) * decay ==> 5 / 2 * distance**2) * decay
+    covariance[j], slope[j] = near**3, ==> covariance[j], slope[j] = near**2,
 requests: a teacher without a reply costs nothing | extras/asking/strategy.py | extras/asking/test_asking.py
     strategy=strategy, gain=-1.0) ==> strategy=strategy, gain=0.0)
 requests: costs do not count | extras/asking/interest.py | extras/asking/test_interest.py

@@ -166,8 +166,7 @@ class Inverse(Part):
         return [self(context, goal) for context, goal in zip(contexts, goals, strict=True)]
 
     def uncertainty(self, context: Array, goals: Array) -> Array:
-        """How unsure answers to ``goals`` ``(n, outcome_dim)`` are, ``(n,)``, in the unit of T. A goal model takes the
-        goal where it is largest. Default: ``sd`` of each answer."""
+        """How unsure answers to ``goals`` ``(n, outcome_dim)`` are, ``(n,)``, in the unit of T; by default ``sd``."""
         return np.array([self(context, goal).sd or 0.0 for goal in goals])
 
     def predict(self, context: Array, theta: Array) -> Array | None:

@@ -35,7 +35,7 @@ JUDGED: Final = 20  # number of movements most like a start, on which the surpri
 DAMPINGS: Final = (1e-3, 0.1, 1.0, 10.0)  # all tried in each step, relative to the mean diagonal of J J^T
 GROSS: Final = 9.0  # squared residual, relative to the usual one, from which on an exemplar is a gross error
 DETERMINED: Final = 0.5  # variance of an outcome given all others, relative to the kernel's, below which they judge it
-OUTLIERS: Final = 8  # largest number of gross errors among the exemplars of a process
+OUTLIERS: Final = 20  # largest number of gross errors among the exemplars of a process
 USUAL: Final = 4.0  # largest squared residual that counts in full when the usual one is computed
 TINY: Final = 1e-300  # guard against 0 where a number is divided or its logarithm is taken
 KERNEL: Final = types.NamedUniTuple(float64, 4, Kernel)  # type: ignore[no-untyped-call]
@@ -312,13 +312,14 @@ def uncertainty(alike: np.ndarray, goals: Array, context: Array, known: Movement
     Args:
         alike: ``(n, k)``, rows of the movements most like each start, the start first.
         goals: ``(n, outcome_dim)``.
-        context, known, kernel: see `answer`.
+        context: ``(context_dim,)``.
+        known, kernel: all movements, and the kernel.
     """
     n, k = alike.shape
     sds, covariance, slope = np.empty(n), np.empty(k), np.empty(k)
     for i in range(n):
         rows = alike[i]
-        process = process_of(as_columns(known.inputs, rows), as_columns(known.outcomes, rows), kernel)
+        process, _ = fitted_process(rows, known.inputs, known.outcomes, kernel)
         question = Question(context, goals[i], rows, alike, rows, context)
         _, theta = descend(process, known.thetas[rows[0]], question, known, float(goals.shape[1]))
         covariances(process.inputs, kernel, in_lengths(theta, context, known.units), covariance, slope)

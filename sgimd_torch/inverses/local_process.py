@@ -19,6 +19,7 @@ from sgimd_torch.inverses.nearest import near_goal
 from sgimd_torch.inverses.tuples import Kernel, Movements, Predictions, Question
 from sgimd_torch.memory import Neighbours, Rows
 from sgimd_torch.memory.compiled import compiled
+from sgimd_torch.memory.exemplars import Exemplars
 from sgimd_torch.memory.growing import Growing
 from sgimd_torch.parts import Inverse, Problem
 from sgimd_torch.spaces import Array, Estimate, read_only, stream
@@ -34,6 +35,7 @@ _STARTS: Final = 6  # number of exemplars where steps begin
 _SHARED: Final = 30  # a start among so many movements most like an earlier start shares its process
 _FEW_ALIKE: Final = 40  # number of exemplars that say how unsure an answer would be
 _LITTLE: Final = 1e-3  # least variance of the noise when gross errors are looked for, relative to that of outcomes
+_BULK: Final = 0.2, 0.8  # quantiles between which most outcomes lie
 _FAR: Final = 1e3  # distance from 0, in standard deviations, beyond which inputs are shifted to 0 against rounding
 
 
@@ -66,14 +68,15 @@ class LocalProcess(Inverse):
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)
         self.memory, self.noise = problem.memory, problem.outcome_noise
+        self._plausible, self._seen = (-np.inf, np.inf), 0  # corners of a box, and number of exemplars compared with it
         self._due = float(_FIRST)  # exemplars at the next fit
         self._kernel: Kernel | None = None  # None while all outcomes are equal
 
     def __call__(self, context: Array, goal: Array) -> Estimate:
         """The answer, and the exemplars of the nearest outcomes, nearest first."""
         context, goal = (np.ascontiguousarray(point, dtype=np.float64) for point in (context, goal))
-        memory = self.memory
         self._catch_up()
+        memory = self.memory
         near = near_goal(memory, context, goal, _NEAR)
         thetas = memory.thetas[near]
         if self._kernel is None:
@@ -133,13 +136,31 @@ class LocalProcess(Inverse):
 
     def _catch_up(self) -> None:
         """Add new exemplars; refit when the memory has grown by half."""
-        n, n_fitted = len(self.memory), 0
+        n, n_fitted = len(self.problem.memory), 0
         while self._due <= n:
             n_fitted, self._due = int(self._due), self._due * _GROWTH
         if n_fitted:
-            self._fit(n_fitted)
-        if self._kernel is not None and len(self._inputs.keys) < n:
+            space, outcomes = self.problem.outcomes, self.problem.memory.outcomes[:n_fitted]
+            low, high = np.quantile(outcomes, _BULK, axis=0)
+            self._plausible = np.minimum(space.low, 2 * low - high), np.maximum(space.high, 2 * high - low)
+            self.memory, self._seen = self.problem.memory, 0
+            self._leave_out(n_fitted)
+            self._fit(len(self.memory) if self.memory is not self.problem.memory else n_fitted)
+        self._leave_out(n)
+        if self._kernel is not None and len(self._inputs.keys) < len(self.memory):
             self._inputs.keys.append(self._scaled(len(self._inputs.keys)))
+
+    def _leave_out(self, n: int) -> None:
+        """Leave out those of the first ``n`` exemplars whose outcome lies outside T and far from most others, like a sensor's
+        error code. ``memory`` becomes another one when the first of them comes."""
+        every, (low, high) = self.problem.memory, self._plausible
+        new = Exemplars.of(every, slice(self._seen, n))
+        plausible = ((new.outcomes >= low) & (new.outcomes <= high)).all(axis=1)
+        if self.memory is every and not plausible.all():
+            self.memory = Exemplars.of(every, slice(self._seen)).memory_like(every)
+        if self.memory is not every:
+            self.memory.extend(*new.some(np.flatnonzero(plausible)))
+        self._seen = n
 
     @one_thread
     def _fit(self, n: int) -> None:
@@ -157,29 +178,39 @@ class LocalProcess(Inverse):
         self._spreads = read_only(_spreads(unscaled - origin))
         if not np.ptp(outcomes, axis=0).any():
             return
-        order = stream(n, "fit of a local process").permutation(n)
-        standard, gross = (unscaled - origin) / self._spreads, order[:0]
+        drawn = stream(n, "fit of a local process").permutation(n)[:_FITTED]
+        standard = (unscaled - origin) / self._spreads
         for last in (False, True):  # at last without gross errors
-            drawn = order[:_FITTED]
             self._units = read_only(np.stack((origin, self._spreads * fit_lengths(standard[drawn], outcomes[drawn]))))
             self._inputs = self.memory.index(Growing(unscaled.shape[1], self._scaled(0)[:n]))
             inputs = self._inputs.keys.rows
-            groups = [rows[~np.isin(rows, gross)] for rows in self._inputs.nearest(inputs[order[:_GROUPS]], _GROUP)]
-            if last or not len(gross := np.concatenate([self._gross(outcomes, rows) for rows in groups])):
+            groups = [*self._inputs.nearest(inputs[drawn[:_GROUPS]], _GROUP)]
+            gross = self._gross(outcomes, groups if last else self._covering(groups, drawn))
+            groups = [rows[~np.isin(rows, gross)] for rows in groups]
+            left = drawn[~np.isin(drawn, gross)]
+            if last or len(left) == len(drawn) or not np.ptp(outcomes[left], axis=0).any():
                 break
-            left = order[~np.isin(order, gross)]
-            if not np.ptp(outcomes[left[:_FITTED]], axis=0).any():
-                break
-            order = left
+            drawn = left
         varied = [rows for rows in groups if np.ptp(outcomes[rows], axis=0).any()]
         if varied:
             self._kernel = choose_kernel([(inputs[rows], outcomes[rows]) for rows in varied], self.noise)
 
-    def _gross(self, outcomes: Array, rows: Rows) -> Rows:
-        """Those of ``rows`` that are gross errors to a smooth process; a rough one would explain them."""
-        noise = self.noise**2 / (float(outcomes[rows].var(axis=0).mean()) or 1.0)
-        kernels, kernel = compiled("sgimd_torch.inverses.kernels"), Kernel(1.0, 1.0, 0.0, min(max(noise, _LITTLE), 1.0))
-        return rows[kernels.gross_errors(self._inputs.keys.rows, outcomes, rows, kernel)]
+    def _covering(self, groups: list[Rows], drawn: Rows) -> list[Rows]:
+        """``groups``, and more groups of neighbours until each of ``drawn`` lies in one."""
+        inputs, groups = self._inputs.keys.rows, [*groups]
+        while len(left := drawn[~np.isin(drawn, np.concatenate(groups))]):
+            near = self._inputs.nearest(inputs[left[:1]], _GROUP)[0]
+            groups.append(near if left[0] in near else left[:1])  # many equal movements may leave it out
+        return groups
+
+    def _gross(self, outcomes: Array, groups: list[Rows]) -> Rows:
+        """Rows of ``groups`` that are gross errors to a smooth process; a rough one would explain them."""
+        kernels, inputs, gross = compiled("sgimd_torch.inverses.kernels"), self._inputs.keys.rows, list[Rows]()
+        for rows in groups:
+            noise = self.noise**2 / (float(outcomes[rows].var(axis=0).mean()) or 1.0)
+            kernel = Kernel(1.0, 1.0, 0.0, min(max(noise, _LITTLE), 1.0))
+            gross.append(rows[kernels.gross_errors(inputs, outcomes, rows, kernel)])
+        return np.concatenate(gross)
 
     def _scaled(self, first: int) -> Array:
         """Inputs from row ``first`` on, in lengths."""

@@ -16,12 +16,10 @@ from numpy.typing import ArrayLike
 
 from sgimd_torch.memory.growing import Growing
 from sgimd_torch.memory.neighbours import Flat, Graph, Rows, Scan
-from sgimd_torch.spaces import Array, check_point, stream
+from sgimd_torch.spaces import Array, check_point
 
 __all__ = ["FlatMemory", "Memory", "Neighbours", "Rows", "ScanMemory"]
 
-_TRIED: Final = 40  # number of exemplars with which a memory of a user's is tried
-_ASKED: Final = 10  # number of neighbours asked of it
 _NO_CONTEXT: Final = "an environment without contexts gives np.zeros(0)"
 
 
@@ -198,33 +196,7 @@ def memory_for(memory: Memory | MakeMemory, dims: tuple[int, int, int]) -> Memor
     if own != dims:
         raise ValueError(f"a memory to start from must have dims {dims} of context, theta, outcome, got {own}")
     if type(memory) not in (Memory, FlatMemory, ScanMemory):
-        _check(memory)
+        from sgimd_torch.memory.trial import check_memory  # for a memory of a user's alone
+
+        check_memory(memory)
     return memory.copy()
-
-
-def _check(memory: Memory) -> None:
-    """Refuse a memory of a user's that answers a few questions wrongly.
-
-    Raises:
-        ValueError: it does not find rows that exist, as many as asked, nearest first.
-    """
-    rng, trial, dims = stream(0, "check of a memory"), memory.empty(), (memory.context_dim, memory.theta_dim)
-    contexts, thetas, outcomes = (rng.random((_TRIED, dim)) for dim in (*dims, memory.outcome_dim))
-    trial.extend(contexts, thetas, outcomes)
-    by_outcome, by_theta = np.hstack((contexts, outcomes)), np.hstack((contexts, thetas))
-    asked = {
-        "near_outcomes": (trial.near_outcomes(contexts[0], outcomes[0], _ASKED), by_outcome),
-        "near_policies": (trial.near_policies(contexts[0], thetas[0], _ASKED), by_theta),
-        "neighbourhoods": (trial.neighbourhoods(np.zeros(1, np.int64), _ASKED)[0], by_theta),
-        "index": (trial.index(Growing(by_theta.shape[1], by_theta)).nearest(by_theta[:1], _ASKED)[0], by_theta),
-    }
-    for method, (rows, keys) in asked.items():
-        what = (
-            f"memory {type(memory).__name__}: of {_TRIED} exemplars, {method} gave the rows {np.asarray(rows).tolist()}"
-        )
-        if len(rows) < _ASKED:
-            raise ValueError(f"{what}, which are fewer than the {_ASKED} asked for")
-        if min(rows) < 0 or max(rows) >= _TRIED:
-            raise ValueError(f"{what}, of which some do not exist")
-        if (np.diff(np.linalg.norm(keys[rows] - keys[0], axis=1)) < 0).any():
-            raise ValueError(f"{what}, which are not in order; the nearest must come first")

@@ -38,7 +38,7 @@ class Scan:
     """Exact neighbours in double precision, by comparison with every row."""
 
     def __init__(self, keys: Growing) -> None:
-        self.keys, self._lock, self._kernels = keys, RLock(), compiled("sgimd_torch.memory.ordered")
+        self.keys, self._lock = keys, RLock()
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.keys,)
@@ -57,7 +57,7 @@ class Scan:
         if n == 0:
             return np.empty((len(queries), 0), np.int64)
         proposed = self._proposed(table, queries, min(k + _SPARE, n))
-        rows: Rows = self._kernels.ordered(table, queries, table[0], *proposed, k, within * within)
+        rows: Rows = _kernels().ordered(table, queries, table[0], *proposed, k, within * within)
         return rows
 
     def _proposed(self, table: Array, queries: Array, k: int) -> tuple[Rows, Single]:
@@ -77,12 +77,12 @@ class Flat(Scan):
         if self._n < len(table):
             with self._lock:
                 self._add(table)
-        squared, proposed = self._flat.search(self._kernels.single(queries, table[0]), k)
+        squared, proposed = self._flat.search(_kernels().single(queries, table[0]), k)
         return proposed, squared
 
     def _add(self, table: Array) -> None:
         """Add the rows that are not indexed yet."""
-        rows = self._kernels.single(table[self._n :], table[0])
+        rows = _kernels().single(table[self._n :], table[0])
         try:
             self._flat.add(rows)
         except (MemoryError, RuntimeError) as error:
@@ -107,7 +107,7 @@ class Graph(Flat):
         if not first:
             return newest, squared
         self._graph.hnsw.efSearch = max(_SEARCHED[0], int(_SEARCHED[1] * table.shape[1]), 2 * k)
-        _, earlier = self._graph.search(self._kernels.single(queries, table[0]), k)
+        _, earlier = self._graph.search(_kernels().single(queries, table[0]), k)
         proposed = np.concatenate((earlier, np.where(newest < 0, -1, newest + first)), axis=1)
         return proposed, np.full(proposed.shape, np.inf, np.float32)
 
@@ -115,8 +115,12 @@ class Graph(Flat):
         n, first = len(table), self._graph.ntotal
         if n > self.flat_up_to and n - first >= _BLOCK:
             for row in range(first, n - _BLOCK + 1, _BLOCK):
-                self._graph.add(self._kernels.single(table[row : row + _BLOCK], table[0]))
+                self._graph.add(_kernels().single(table[row : row + _BLOCK], table[0]))
             self._flat.reset()
             self._n = self._graph.ntotal
         if self._n < n:
             super()._add(table)
+
+
+def _kernels() -> Any:
+    return compiled("sgimd_torch.memory.ordered")

@@ -2,7 +2,6 @@
 
 Examples:
   sgimd run --algorithm sgim-d --seed 3 --resume              go on after Ctrl-C, or with more --movements
-  sgimd run --algorithm sagg-riac --goals uniform --name uniform --movements 2000
   sgimd run --environment mypackage.toss:make                 a run on your own robot
 """
 

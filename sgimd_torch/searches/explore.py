@@ -16,6 +16,7 @@ from sgimd_torch.spaces import Array, check_count
 _ENOUGH: Final = 16  # least number of exemplars with an effect from which an inverse model can learn
 _LEAST_SHARE: Final = 0.05  # least probability of a movement that is uniform in Pi
 _GREATEST_SHARE: Final = 0.2  # greatest probability of such a movement after the first movements
+_WIDE: Final = 25  # number of parameters from which on the share of the way from the middle is uniform
 _ANYWHERE: Final = 0.5  # share of the global movements that are uniform in Pi, to find other effects
 _SIMILAR: Final = 10  # number of movements with an effect, in the most similar contexts, of which one is varied
 _FIRST_WIDTH: Final = 0.1  # standard deviation of the first variations, relative to the sides of Pi
@@ -38,7 +39,8 @@ class Returning(Explore):
     """First around the middle of Pi, then anywhere; if effects are rare, variations of movements that had an effect.
 
     While every movement has an effect, the first movements go a uniform share of the way from the middle of Pi to a
-    uniform movement, because small movements can often be predicted from few exemplars. Later global movements are
+    uniform movement, because small movements can often be predicted from few exemplars; the fewer parameters, the
+    farther. Later global movements are
     uniform in Pi; their probability is ``first`` / n after n movements, within bounds.
 
     Otherwise movements are uniform in Pi until one has an effect; then half of them are variations of a movement that
@@ -83,7 +85,8 @@ class Returning(Explore):
         if effective is None:
             middle = (policies.low + policies.high) / 2
             is_uniform = len(self.problem.memory) >= self.first or self.rng.random() < self.uniform
-            return policies.clip(middle + (1.0 if is_uniform else self.rng.random()) * (anywhere - middle))
+            far = 1.0 if is_uniform else self.rng.random() ** min(1.0, policies.dim / _WIDE)
+            return policies.clip(middle + far * (anywhere - middle))
         if len(self.problem.memory) > self._seen:  # several robots may move at once
             for theta in self._varied:
                 has_effect = bool(policies.same(effective.thetas, theta).any())

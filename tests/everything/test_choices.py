@@ -18,7 +18,7 @@ SCRIPTS = {**os.environ, "PYTHONPATH": str(ROOT)}
     [
         item
         for item in WORDS.items()
-        if item[0] not in ("algorithm", "environment", "command", "network", "watch", "hook")
+        if item[0] not in ("algorithm", "environment", "command", "network", "watch", "memory", "hook")
     ],
 )
 def test_every_choice_runs_and_differs_from_the_others(tmp_path, go, kind, table):
@@ -26,7 +26,7 @@ def test_every_choice_runs_and_differs_from_the_others(tmp_path, go, kind, table
     option = {"progress": "goals.progress", "choose": "teacher.choose"}.get(kind, kind)
     # Short attempts and a short window, so that the map is split, and has its say, before the run is over.
     common = ["--evaluate_at", "[]", "--environment", "planar-arm-7", "--benchmark", "null"]
-    common += ["--movements", 240 if kind in ("goals", "progress") else 120]
+    common += ["--movements", 240 if kind in ("goals", "progress", "judge") else 120]
     common += ["--algorithm", "sgim-im"] if kind == "teachers" else ["--budget", 3]
     common += ["--teacher.every", 20] if kind == "choose" else []
     common += ["--goals.window", 4] if kind == "progress" else []
