@@ -52,6 +52,8 @@ eq. (7): performance below -1 | competence.py | test_competence.py
     -np.minimum(1.0, _distance( ==> -np.minimum(9.0, _distance(
 eq. (8): unsteady neighbourhoods are preferred | inverses/local.py | inverses/test_inverse_model.py
     + self.alpha * spreads ==> - self.alpha * spreads
+eq. (8): one neighbourhood too few is compared | inverses/local.py | inverses/test_inverse_model.py
+    context, goal, self.h_max) ==> context, goal, self.h_max - 1)
 eq. (9): a narrower Gaussian | inverses/local.py | inverses/test_inverse_model.py
     np.exp(0.5 * ( ==> np.exp(1.0 * (
 eq. (10): root mean square in place of the mean | evaluation.py | test_evaluation.py
@@ -68,6 +70,10 @@ simplex: movements outside of Pi | searches/simplex.py | searches/test_search.py
     policies.clip(self.rng.normal(theta, noise * policies.sides) if noise ==> (theta + 9 if noise
 gradient search: errors at anchors are added | forward_model/anchored.py | forward_model/test_anchored.py
     return landing + correction, ==> return landing - correction,
+gradient search: Adam's second moment is too short | forward_model/anchored.py | forward_model/test_anchored.py
+    square.lerp(gradient**2, 0.001) ==> square.lerp(gradient**2, 0.1)
+gradient search: Adam's second moment is not corrected | forward_model/anchored.py | forward_model/test_anchored.py
+    (square / (1 - 0.999**i)) ==> (1000 * square)
 gradient search: no penalty of the variance | forward_model/anchored.py | forward_model/test_anchored.py
     ((landing - goals) ** 2).sum(dim=-1) + variance ==> ((landing - goals) ** 2).sum(dim=-1) + 0 * variance
 training: noise weighs twice in the loss | forward_model/networks.py | forward_model/test_networks.py

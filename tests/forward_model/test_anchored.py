@@ -185,6 +185,17 @@ def test_a_descent_comes_down_and_stays_in_the_box_and_in_the_trust_region(model
         assert lengths.max() == pytest.approx(radius, rel=1e-4)
 
 
+def test_a_descent_takes_the_steps_of_torchs_adam(model, memory):
+    near = anchored(model, memory, np.arange(5))
+    start, goals = near.tensor(0.3 + 0.4 * memory.thetas[:5]), near.tensor(memory.outcomes[50:55])
+    theta = start.clone().requires_grad_()
+    adam = torch.optim.Adam([theta], lr=0.02, eps=1e-30)
+    for _ in range(10):
+        theta.grad = gradient_at(near, theta, goals)
+        adam.step()
+    torch.testing.assert_close(near.descend(start, goals, steps=10, step=0.02), theta.detach(), atol=1e-4, rtol=0)
+
+
 def test_a_step_is_a_share_of_each_side_whatever_the_unit(memory):
     """Parameters in other units, learnt in these: the descent is the same."""
     paths = []

@@ -72,6 +72,15 @@ def test_a_reproducible_movement_farther_away_beats_an_erratic_one_on_the_goal()
     assert LocalInverse(given, alpha=1.6, variance=True)(NO_CONTEXT, goal).theta[0] == pytest.approx(0.905)  # 0.128
 
 
+def test_ten_nearest_outcomes_are_compared_no_fewer() -> None:
+    # Nine erratic pairs nearest to the goal, standard deviation 2 / sqrt(2) = 1.4; then a reliable one.
+    erratic = {0.1 * k + pair: 0.001 * k + 400 * pair for k in range(9) for pair in (0.0, 0.005)}
+    given = line(erratic | {0.95: 0.12, 0.955: 0.12})
+    ten, nine = (LocalInverse(given, dist_n=0.01, **h)(NO_CONTEXT, np.zeros(1)).theta[0] for h in ({}, {"h_max": 9}))
+    assert ten == pytest.approx(0.9525)
+    assert nine < 0.01
+
+
 def test_a_movement_without_neighbours_is_trusted_as_the_median_of_the_others() -> None:
     # Standard deviations of the pairs 0, 0.4 / sqrt(2) = 0.28 and 1.4: median 0.28, so 0 + 0.14 for the loner.
     loner, reliable = {0.5: 0.0}, {0.10: 0.12, 0.11: 0.12}
