@@ -90,6 +90,10 @@ class Block(NamedTuple):
                 else:
                     assert (program, command(_call, words)) == ("sgimd", 0), f"{self}: {line}"
 
+    def told(self):
+        """Numbers with which comments behind a print begin."""
+        return re.findall(r"^ *print\(.*\)  # (-?\d[\d.]*)", self.text, re.MULTILINE)
+
     def lines(self):
         """Each command as one line."""
         return [line for line in self.text.replace("\\\n", " ").splitlines() if line.strip()]
@@ -124,9 +128,10 @@ def folder(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("block", [block for page in ALONE for block in blocks(page, "python", "sh")], ids=str)
-def test_a_block_works_on_its_own(block, folder):
+def test_a_block_works_on_its_own_and_prints_what_it_says(block, folder, capsys):
     block.carry_out()
     assert not list(folder.iterdir()), "an example leaves files behind"
+    assert {*block.told()} <= {*capsys.readouterr().out.split()}
 
 
 @pytest.mark.slow
@@ -192,6 +197,7 @@ def understand(name, words):
 
 def test_the_readme_and_its_example_are_short_enough_to_read():
     first = next(blocks("README.md", "python"))
+    assert first.told()
     assert len([line for line in first.text.splitlines() if line.strip()]) <= 15
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     assert len(text.split()) <= 800
