@@ -148,6 +148,33 @@ def goals(figure: Figure, study: Replication) -> None:
 
 
 @png
+def mapping(figure: Figure, study: Replication) -> None:
+    """Two joints of a recording: as recorded, as the robot repeats them, and the knots of theta_d."""
+    figure.set_size_inches(8.6, 4)
+    for ax, mapped in zip(figure.subplots(1, 2, sharex=True), study.mapped(), strict=True):
+        ax.plot(mapped.times, mapped.recorded, "--", color="0.4", label="recorded")
+        ax.plot(mapped.times, mapped.repeated, color=OF_DEMONSTRATOR[3], label="repeated by the robot")
+        ax.plot(np.linspace(0, mapped.times[-1], len(mapped.knots)), mapped.knots, "ko", label="knots")
+        ax.set(title=f"joint {mapped.joint}, misfit {mapped.misfit:.3f} rad", xlabel="time (s)", ylabel="angle (rad)")
+        ax.grid(alpha=0.3)
+    figure.legend(*ax.get_legend_handles_labels(), loc="outside upper center", ncols=3, frameon=False)
+
+
+@png
+def maps(figure: Figure, study: Replication) -> None:
+    """Benchmark goals in T, and the outcomes that each demonstrator shows."""
+    figure.set_size_inches(11.7, 3.6)
+    points = {"0.3": ("benchmark", study.variants["sgim-d"].runs[0].benchmark)}
+    for k, shown in study.demonstrators.items():
+        points[OF_DEMONSTRATOR[k]] = f"demonstrator {k}", np.array([demonstration.outcome for demonstration in shown])
+    axes = figure.subplots(1, len(points), sharex=True, sharey=True)
+    for ax, (colour, (name, outcomes)) in zip(axes, points.items(), strict=True):
+        ax.plot(*outcomes.T, ".", color=colour, markersize=4)
+        ax.set(title=f"{name}: {len(outcomes)} points", xlabel="x (m)", aspect="equal", xlim=(-1, 1), ylim=(-1, 1))
+    axes[0].set_ylabel("y (m)")
+
+
+@png
 def repeated(figure: Figure, study: Replication) -> None:
     """Outcomes of three random policies, each repeated: in T, and around the mean of each policy."""
     figure.set_size_inches(8.6, 4.3)

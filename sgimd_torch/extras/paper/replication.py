@@ -13,6 +13,7 @@ import numpy as np
 from scipy import stats
 
 from sgimd_torch.demonstrations import SHIPPED, load_demonstrations
+from sgimd_torch.environments.fishing_rod import FishingRod
 from sgimd_torch.environments.protocol import execute_many
 from sgimd_torch.extras.table.names import NAMES
 from sgimd_torch.extras.table.results import MISSING
@@ -41,6 +42,25 @@ class Table(NamedTuple):
     rows: Sequence[Sequence[str]]
 
 
+class Mapped(NamedTuple):
+    """A joint of a recording, and how the robot repeats it, eq. (6).
+
+    Attributes:
+        joint: number of the joint, from 1.
+        misfit: root mean square of repeated minus recorded angles (rad).
+        times: ``(n,)`` s.
+        recorded, repeated: ``(n,)`` angles (rad).
+        knots: ``(4,)`` angles (rad) of theta_d, evenly spread over the movement.
+    """
+
+    joint: int
+    misfit: float
+    times: Array
+    recorded: Array
+    repeated: Array
+    knots: Array
+
+
 class Replication:
     """The runs of the study.
 
@@ -64,6 +84,23 @@ class Replication:
             k: np.stack([theta_of(self._task, demonstration) for demonstration in shown])
             for k, shown in self.demonstrators.items()
         }
+
+    def mapped(self) -> list[Mapped]:
+        """The joints with the largest and the smallest misfit, of the recording of demonstrator 3 with the largest."""
+        rod, best, found = self._task.environment, 0.0, list[Mapped]()
+        assert isinstance(rod, FishingRod)
+        for shown, theta in zip(self.demonstrators[3], self.demonstrated[3], strict=True):
+            times = shown.times - shown.times[0]
+            repeated = rod.primitive.at(theta, times)
+            misfits = np.sqrt(np.mean((repeated - shown.trajectory) ** 2, axis=0))
+            if misfits.max() > best:
+                best, joints = misfits.max(), rod.primitive.joints
+                knots = joints.low[:, None] + theta[:-1].reshape(joints.dim, -1) * joints.sides[:, None]
+                found = [
+                    Mapped(j + 1, misfits[j], times, shown.trajectory[:, j], repeated[:, j], knots[j])
+                    for j in (misfits.argmax(), misfits.argmin())
+                ]
+        return found
 
     @cached_property
     def taught(self) -> dict[int, Array]:
