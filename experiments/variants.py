@@ -38,10 +38,10 @@ STEPS: Final[tuple[tuple[str, Variant], ...]] = (
     ("noise", {"search.noise": 0.05}),
     ("progress", {"goals.progress": "gained"}),
     ("giving-up", {"give_up": -0.5}),
-    ("regions", {"goals.g_max": 30}),
     ("slivers", {"goals.max_aspect": 5.0}),  # then the inverse model `process` leads to our defaults
 )
 INVERSE: Final[Variant] = {"inverse": "paper"}  # the letter of the paper for learners without goals
+VARIED: Final[Variant] = {**INVERSE, "exact_first": False}  # the same for imitation
 LARGE: Final[Variant] = {"environment.task_space": 100.0}
 BASELINE: Final[Variant] = {"goals": "uniform", "inverse": "nearest", "search": "perturb"}  # standard baseline
 SCHOOL: Final = ("map-elites", "cma-mae")  # algorithms of quality diversity; they take no context
@@ -77,7 +77,7 @@ HALVES: Final = ("low-half", "high-half")
 
 def _of_teacher(teacher: int, ending: str = "") -> dict[str, Variant]:
     """Learners taught by demonstrator 1 or 2; with the ending "-letter" they learn by the letter of the paper."""
-    letter = {"sgim-d": SGIM_D_LETTER, "imitation": INVERSE, "observation": INVERSE}
+    letter = {"sgim-d": SGIM_D_LETTER, "imitation": VARIED, "observation": INVERSE}
     return {
         f"{algorithm}{ending}-teacher-{teacher}": {
             "algorithm": algorithm,
@@ -116,7 +116,7 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
         "random-letter": {"algorithm": "random", **INVERSE, **WHOLE},
         "sagg-riac-letter": {**SAGG_RIAC_LETTER, **WHOLE},
         "observation-letter": {"algorithm": "observation", **INVERSE, **WHOLE},
-        "imitation-letter": {"algorithm": "imitation", **INVERSE, **WHOLE},
+        "imitation-letter": {"algorithm": "imitation", **VARIED, **WHOLE},
         "sgim-d-letter": {**SGIM_D_LETTER, **WHOLE, **FLOOR},
     },
     "large": {

@@ -21,7 +21,7 @@ MakeWatcher: TypeAlias = Callable[[Begin, Learner, Memory | None], Watcher | Non
 def nobody(begin: Begin, learner: Learner, prior: Memory | None) -> Watcher | None:
     """Nobody: changes of the robot are not noticed."""
     if prior is not None:
-        raise ValueError("prior (--begin-with) needs a watcher, which finds out what holds of it; got none")
+        raise ValueError("prior (--begin-with) needs a watcher, which finds out what holds of it; got --watch none")
     return None
 
 

@@ -22,9 +22,10 @@ class LocalInverse(Inverse):
     Args:
         problem: problem to learn.
         h_max: number of exemplars, those nearest to the goal, whose neighbourhoods are compared, eq. (8).
-        k_max: largest number of exemplars in a neighbourhood.
-        dist_n: radius of a neighbourhood in Pi, the paper's distN; None: the paper's .6 in its 25
-            dimensions, and 0.6 sqrt(theta_dim / 25) in others, because distances grow with sqrt(theta_dim).
+        k_max: largest number of exemplars in a neighbourhood. The paper gives no number; 25 of them and theta_g are its
+            simplex of 26 points.
+        dist_n: radius of a neighbourhood in Pi, the paper's distN; None: 0.6 sqrt(theta_dim / 25), because distances
+            grow with sqrt(theta_dim). The paper gives no number.
         alpha: weight of the standard deviation of outcomes in a neighbourhood; their distance to the goal has weight 1.
         variance: true: the variance takes the place of the standard deviation, as the paper prints it.
         width: width of the Gaussian of eq. (9), relative to the mean distance of the neighbourhood's outcomes from the
@@ -41,7 +42,7 @@ class LocalInverse(Inverse):
         problem: Problem,
         *,
         h_max: int = 10,
-        k_max: int = 10,
+        k_max: int = 25,
         dist_n: float | None = None,
         alpha: float = 0.5,
         variance: bool = False,

@@ -1,6 +1,6 @@
 """The paper's figures, made anew: runs of its five learners, and a page that shows each figure beside its statement.
 
-Section 6 of Nguyen & Oudeyer (2014), and the noise of section 4.5. The runs of each variant go to OUT/NAME/seed-000,
+Section 6 of Nguyen & Oudeyer (2014), and figs. 5 to 7 of its method. The runs of each variant go to OUT/NAME/seed-000,
 the page is OUT/paper.html. Repeat the command after Ctrl-C, with more seeds or with --full: finished runs are kept,
 unfinished ones continue. A longer study and verdicts on each statement are in results/RESULTS.md of the repository.
 
@@ -112,6 +112,7 @@ def plan_of(out: Path, words: Sequence[str], *, ours: bool) -> dict[str, Config]
         for learner in learners:
             letter = f"{learner}-letter" if learner in ("sagg-riac", "sgim-d") else learner
             own = [] if ours or letter != learner else ["--inverse=paper"]  # sgim-d-letter has it by default
+            own += ["--exact-first=false"] * (learner == "imitation" and not ours)
             algorithm = learner if ours else letter
             given = [f"--algorithm={algorithm}", f"--environment={ROD}", *own, *differing, *words]
             plan[learner + ending] = replace(parse(given)[0], out=out, name=algorithm + ending)

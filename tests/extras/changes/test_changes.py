@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from changing import Changing
-from sgimd_torch.algorithms.paper import sagg_riac, sgim_d
+from sgimd_torch.algorithms.paper import sagg_riac, sagg_riac_letter, sgim_d
 from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.extras.changes.calibration import Calibration
 from sgimd_torch.extras.changes.eras import Era, Exemplars
+from sgimd_torch.extras.changes.watcher import changes
 from sgimd_torch.forward_model.search import GradientSearch
 from sgimd_torch.inverses.local import LocalInverse
 from sgimd_torch.inverses.local_process import LocalProcess
@@ -26,7 +27,12 @@ from worlds import NO_CONTEXT, demonstrate, demonstrations, executed, last_postu
 
 ARM = PlanarArm(3)
 GOALS = np.array([[0.3, 0.4], [-0.4, 0.5], [0.6, -0.1], [0.1, -0.7]])
-LIVES = {"practice": practice, "sagg-riac": sagg_riac, "sgim-d": partial(sgim_d, correspondence=last_posture)}
+WATCHED = partial(sagg_riac, watch=changes)
+LIVES = {
+    "practice": practice,
+    "sagg-riac": WATCHED,
+    "sgim-d": partial(sgim_d, correspondence=last_posture, watch=changes),
+}
 
 
 def live(learner, robot, movements, at_once=1, seed=0, teacher=None):
@@ -217,7 +223,7 @@ class Sure(Inverse):
 
 def test_a_change_is_noticed_with_any_inverse_model_that_says_how_sure_it_is():
     robot = Changing(ARM, "reversed", 200)
-    learner = sagg_riac(robot, 3, inverse=Sure)
+    learner = WATCHED(robot, 3, inverse=Sure)
     live(learner, robot, 260)
     (change,) = learner.changes
     assert 198 <= change.since <= 204
@@ -238,11 +244,19 @@ UNWATCHED = {
 
 @pytest.mark.parametrize("why", UNWATCHED)
 def test_who_cannot_begin_again_notices_nothing_and_refuses_a_prior_that_would_count_for_good(why):
-    learner = sagg_riac(ARM, 0, **UNWATCHED[why])
+    learner = WATCHED(ARM, 0, **UNWATCHED[why])
     assert learner.watcher is None
     assert learner.problem.remarks == [f"changes of the robot are not noticed: {why}"]
     with pytest.raises(ValueError, match=rf"prior \(--begin-with\) needs .*{why}.*; was another --inverse meant"):
-        sagg_riac(ARM, 0, prior=executed(ARM, [[0.5, 0.5, 0.5]]), **UNWATCHED[why])
+        WATCHED(ARM, 0, prior=executed(ARM, [[0.5, 0.5, 0.5]]), **UNWATCHED[why])
+
+
+@pytest.mark.parametrize("make", [sagg_riac, sagg_riac_letter, partial(sgim_d, correspondence=last_posture)])
+def test_algorithms_of_the_paper_notice_nothing_unless_told_to_watch(make):
+    learner = make(ARM, 0)
+    assert (learner.watcher, learner.problem.remarks) == (None, [])
+    with pytest.raises(ValueError, match=r"prior \(--begin-with\) needs a watcher, .*; got --watch none"):
+        make(ARM, 0, prior=executed(ARM, [[0.5, 0.5, 0.5]]))
 
 
 def test_a_calibration_finds_offset_and_gain():

@@ -29,6 +29,7 @@ FIGURES = [
     "Histograms of outcomes of Random, SAGG-RIAC and SGIM-D",
     *("Trajectories of joint 1 by demonstrator", "Means of the parameters of theta by demonstrator"),
     *("Error curves in both task spaces", "Goals of SAGG-RIAC and SGIM-D in the larger task space"),
+    *("Two joints of a recording, as recorded and as repeated", "Benchmark goals, and outcomes of the demonstrators"),
     "Outcomes of three policies, each repeated",
 ]
 
@@ -62,6 +63,10 @@ def test_the_learners_are_those_of_the_paper_unless_ours_are_wanted(tiny):
     assert {name: config["inverse"] for name, config in plan.items()} == dict.fromkeys(plan, "paper")
     assert {name: config["inverse"] for name, config in ours.items()} == dict.fromkeys(plan, "process")
     assert [plan[name].algorithm for name in ("sagg-riac", "sgim-d-large")] == ["sagg-riac-letter", "sgim-d-letter"]
+    varied = {name: config["exact_first"] for name, config in plan.items() if name.startswith("imitation")}
+    varied |= {name: config["social.exact_first"] for name, config in plan.items() if name.startswith("sgim-d")}
+    assert not any(varied.values())
+    assert "changes" not in {config.settings.get("watch") for config in plan.values()}
     assert [config.demonstrations.stem[-1] for config in plan.values() if config.demonstrations] == [*"111222"]
     assert [name for name, config in plan.items() if config["environment.task_space"] == 100] == [
         *("sagg-riac-large", "sgim-d-large")
@@ -82,12 +87,13 @@ def test_every_figure_is_on_the_page_beside_its_statement_and_nothing_is_fetched
         with Image.open(io.BytesIO(base64.b64decode(content))) as picture:
             assert min(picture.size) >= 400
     assert not re.search(r"https?:|file:|<script", re.sub(r"base64,[A-Za-z0-9+/=]*", "", page))
-    assert re.findall(r"<strong>The paper \(section [46]\.|<img ", page)[1::2] == ["<img "] * len(FIGURES)
+    assert re.findall(r"<strong>The paper \(sections? [456]\.|<img ", page)[1::2] == ["<img "] * len(FIGURES)
     assert [text for text in Page(page).all("strong") if text.startswith("The paper")] == [
         f"The paper ({place})."
         for place in (
             *("section 6.1, fig. 8a", "section 6.3, fig. 8b", "section 6.2, fig. 8c", "section 6.3, fig. 8d"),
-            *("section 6.3", "section 6.4, fig. 8e", "section 6.5, fig. 8f", "section 4.5, fig. 6"),
+            *("section 6.3", "section 6.4, fig. 8e", "section 6.5, fig. 8f", "section 4.1, fig. 5"),
+            *("sections 5.2 and 5.3, fig. 7b, c", "section 4.5, fig. 6"),
         )
     ]
 
@@ -121,6 +127,17 @@ def test_repeated_policies_scatter_only_by_the_noise_of_the_rod(study):
     assert (study.repeated.std(axis=1) > 0).all()
     without = paper.plan_of(Path(), ["--environment.noise", "0"], ours=False)["sgim-d"]
     assert (np.ptp(Replication(without, {}).repeated, axis=1) == 0).all()
+
+
+def test_two_joints_of_a_recording_and_the_points_of_all_sets_are_drawn(study):
+    worst, best = study.mapped()
+    assert 0.01 < worst.misfit > 2 * best.misfit
+    for joint, ax in zip((worst, best), drawn(paper_figures.mapping, study).axes, strict=True):
+        recorded, repeated, knots = (line.get_ydata() for line in ax.lines)
+        assert np.sqrt(np.mean((repeated - recorded) ** 2)) == pytest.approx(joint.misfit)
+        assert knots.min() <= repeated.min() <= repeated.max() <= knots.max()  # means of the knots, eq. (5)
+    points = [len(ax.lines[0].get_xdata()) for ax in drawn(paper_figures.maps, study).axes]
+    assert points == [len(study.variants["sgim-d"].runs[0].benchmark), 127, 127, 127]
 
 
 def test_parameters_with_other_means_or_spreads_are_counted(tiny):
