@@ -167,7 +167,7 @@ def sagg_riac_letter(environment: Environment, seed: int, **options: Any) -> Lea
 
 @with_keywords_of(sgim_d, social=VARIED, inverse=LocalInverse, **LETTER)
 def sgim_d_letter(environment: Environment, seed: int, *, correspondence: Correspondence, **options: Any) -> Learner:
-    """SGIM-D to the letter: eqs. (3) and (9), 26 vertices, no limits; all imitations are varied.
+    """SGIM-D to the letter: eqs. (3) and (9), 26 vertices, any probability of global exploration.
 
     Options as for `sgim_d`.
     """
