@@ -151,8 +151,8 @@ class LocalProcess(Inverse):
             self._inputs.keys.append(self._scaled(len(self._inputs.keys)))
 
     def _leave_out(self, n: int) -> None:
-        """Leave out those of the first ``n`` exemplars whose outcome lies outside T and far from most others, like a sensor's
-        error code. ``memory`` becomes another one when the first of them comes."""
+        """Leave out those of the first ``n`` exemplars whose outcome lies outside T and far from most others, such as
+        error codes. ``memory`` becomes another one when the first of them comes."""
         every, (low, high) = self.problem.memory, self._plausible
         new = Exemplars.of(every, slice(self._seen, n))
         plausible = ((new.outcomes >= low) & (new.outcomes <= high)).all(axis=1)
