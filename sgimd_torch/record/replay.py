@@ -22,7 +22,7 @@ from sgimd_torch.learner import Learner
 from sgimd_torch.learner.events import TEACHER, BeforeMovement, Event, Kind
 from sgimd_torch.parts import Teacher
 from sgimd_torch.record import Record, ReplayError, RunError
-from sgimd_torch.spaces import Array, Box, Demonstration, Episode, Failure, Move, Request
+from sgimd_torch.spaces import ROUNDING, Array, Box, Demonstration, Episode, Failure, Move, Request
 
 _HINT: Final = "was it recorded by another version or processor, or with another seed or configuration?"
 _TRAINED_ELSEWHERE: Final = (
@@ -39,6 +39,10 @@ _ALONE: Final = (
 _ROUNDED: Final = (
     "movement {} was recorded with a theta that differs by rounding: another version or processor made the record. The "
     "learner remembers the recorded theta"
+)
+_LESSON_ROUNDED: Final = (
+    "before movement {} a demonstration was shown that differs by rounding: another version or processor made the "
+    "record. The recorded demonstration counts"
 )
 
 
@@ -130,8 +134,9 @@ def replay(
         Demonstration, request and reply since the last episode of each robot, by number of the robot.
 
     Raises (when iterated):
-        ReplayError: the learner proposes a movement, or the teacher a demonstration, that differs from the record. A
-            theta that differs by rounding, see `Box.same`, gives one `RuntimeWarning`, and the recorded theta counts.
+        ReplayError: the learner proposes a movement, or the teacher a demonstration, that differs from the record. If a
+            theta or a demonstration differs by rounding, see `ROUNDING`, the recorded one counts, and the first such
+            difference gives a `RuntimeWarning`.
     """
     rounded = False
     offered: dict[int, Demonstration | None] = {}  # by number of the movement
@@ -148,7 +153,10 @@ def replay(
         match event.kind:
             case Kind.SHOWN:
                 if event.who == TEACHER and teacher is not None:
-                    _check_lesson(last, event.lesson, offered.pop(last, None))
+                    differs = _check_lesson(last, event.lesson, offered.pop(last, None))
+                    if differs and not rounded:
+                        warnings.warn(_LESSON_ROUNDED.format(last), RuntimeWarning, stacklevel=2)
+                    rounded |= differs
                 assert event.lesson is not None
                 try:
                     learner.watch(event.lesson, who=event.who, robot=event.robot)
@@ -273,14 +281,19 @@ def _check_repeats(box: Box, index: int, name: str, recorded: Array, now: Array 
         )
 
 
-def _check_lesson(index: int, recorded: Demonstration | None, offered: Demonstration | None) -> None:
-    """Refuse a teacher that offers another demonstration than the recorded one."""
-    fields = ("context", "times", "trajectory", "outcome")
-    if recorded is None or offered is None:
-        same = recorded is offered
-    else:
-        same = all(np.array_equal(getattr(recorded, name), getattr(offered, name)) for name in fields)
-    if not same:
-        was, now = ("nothing" if lesson is None else "a demonstration" for lesson in (recorded, offered))
-        other = "another one" if recorded is not None and offered is not None else now
-        raise ReplayError(f"before movement {index} {was} was shown, the teacher now offers {other}; is it built anew?")
+def _check_lesson(index: int, recorded: Demonstration | None, offered: Demonstration | None) -> bool:
+    """Refuse a teacher that offers another demonstration than the recorded one.
+
+    Returns:
+        Whether the demonstrations differ, by rounding.
+    """
+    if recorded is offered:
+        return False
+    if recorded is not None and offered is not None:
+        fields = ("context", "times", "trajectory", "outcome")
+        pairs = [(getattr(recorded, name), getattr(offered, name)) for name in fields]
+        if all(was.shape == now.shape and np.allclose(was, now, ROUNDING, ROUNDING) for was, now in pairs):
+            return not all(np.array_equal(was, now) for was, now in pairs)
+    was, now = ("nothing" if lesson is None else "a demonstration" for lesson in (recorded, offered))
+    other = "another one" if recorded is not None and offered is not None else now
+    raise ReplayError(f"before movement {index} {was} was shown, the teacher now offers {other}; is it built anew?")

@@ -18,6 +18,7 @@ from sgimd_torch.memory import Memory
 from sgimd_torch.parts import Teacher
 from sgimd_torch.spaces import Array, Demonstration, check_count, check_rng, check_vector
 
+ROUNDED: Final = 1e-9  # share of a tile's side
 _STALLED: Final = 0.01  # least relative fall of the mean distance between two checks; below, the learner has stalled
 
 
@@ -55,7 +56,9 @@ def least_explored(
 
     def cells(outcomes: Array) -> Array:
         # The upper border belongs to the last tile; otherwise the farthest demonstrations would have their own tile.
-        return np.where(outcomes == high, tiles - 1, np.floor((outcomes - low) / side))
+        # Rounding, which differs between processors, moves no outcome to another tile.
+        place = (outcomes - low) / side + ROUNDED
+        return np.where(np.abs(outcomes - high) <= ROUNDED * side, tiles - 1, np.floor(place))
 
     occupied, tile_of = np.unique(cells(demonstrated), axis=0, return_inverse=True)
     reached = Counter(map(tuple, cells(memory.outcomes).tolist()))

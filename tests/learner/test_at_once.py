@@ -1,5 +1,7 @@
 """Several robots move at once: one learner, an attempt for each robot; what one does, or fails to do, is its own."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -226,12 +228,16 @@ def test_too_many_failures_end_the_run_after_the_whole_group():
 def test_a_record_that_differs_by_rounding_goes_on_from_what_was_executed_and_says_so_once(name, at_once, tmp_path):
     _, _, events = lived(name, tmp_path / "whole", 45, at_once)
     rng = stream(0, "rounding")
-    other = [
-        event
-        if event.theta is None
-        else event._replace(theta=ARM.policies.clip(event.theta + 1e-12 * rng.normal(size=5)))
-        for event in events
-    ]
+
+    def elsewhere(event):
+        if (lesson := event.lesson) is not None:
+            trajectory = lesson.trajectory + 1e-12 * rng.normal(size=lesson.trajectory.shape)
+            event = event._replace(lesson=replace(lesson, trajectory=trajectory, outcome=lesson.outcome + 1e-15))
+        if event.theta is not None:
+            event = event._replace(theta=ARM.policies.clip(event.theta + 1e-12 * rng.normal(size=5)))
+        return event
+
+    other = [elsewhere(event) for event in events]
     with pytest.warns(RuntimeWarning, match="differs by rounding") as said:
         learner, episodes, _ = lived(name, tmp_path / "other", 60, at_once, events=other)
     assert len(said) == 1
