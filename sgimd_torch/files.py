@@ -165,14 +165,14 @@ def make_folder(path: Path) -> None:
 
 
 def read_csv(path: Path) -> list[tuple[int, list[str]]]:
-    """The rows of a table with commas that have any field, each with the number of its line, from 1.
+    """The rows of a table with commas that have any field, each with the number of its line, from 1; a BOM is no text.
 
     Raises:
         ValueError: the file is no such table.
         OSError: there is no file, or it is a pipe or a device.
     """
     check_regular(path)
-    with path.open(encoding="utf-8", newline="") as file:
+    with path.open(encoding="utf-8-sig", newline="") as file:
         try:
             return [(rows.line_num, row) for rows in [csv.reader(file)] for row in rows if row]
         except (csv.Error, UnicodeDecodeError) as error:

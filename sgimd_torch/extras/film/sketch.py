@@ -15,7 +15,7 @@ from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
-from matplotlib import rc_context
+from matplotlib import style
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from PIL import Image
@@ -110,7 +110,7 @@ def panel(space: Box, goals: Array, errors: Array, now: int, curve: tuple[Array,
     plane, near = limits(goals, space), rounded(float(np.ptp(goals, axis=0).max() or 1.0) / 50)
     margin = plane.sides / 20
     section = sections(replace(plane, low=plane.low - margin, high=plane.high + margin))[0]
-    with rc_context({**STYLE, **TEXT}):
+    with style.context({**STYLE, **TEXT}, after_reset=True):
         figure = blank(0.75 * HEIGHT, layout="constrained")
         above, below = figure.subplots(2, height_ratios=[2.2, 1])
         misses(above, goals, errors, space, section, 6 * near)

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from sgimd_torch.environments.protocol import reason_of
 from sgimd_torch.runs.hooks import Hook, Listener
+from sgimd_torch.runs.messages import say
 
 if TYPE_CHECKING:
     from sgimd_torch.board.listener import BoardListener
@@ -34,11 +36,14 @@ class Drawing(Listener):
         self._parts, self._board, self._drawn_at = loop.parts, board, 0
 
     def evaluated(self, movements: int, evaluations: Mapping[str, Evaluation]) -> None:
-        """Draw the errors of an evaluation, and the competence of the regions."""
+        """Draw the errors of an evaluation, and the competence of the regions; a run goes on without a picture."""
         if movements < 2 * self._drawn_at and movements != self._parts.config.movements:
             return
-        from sgimd_torch.extras.pictures.pictures import maps_of
-
         self._drawn_at, robot = movements, self._parts.environment
         goals, errors = self._parts.benchmark.goals, evaluations["own"].errors
-        self._board.show_pictures(maps_of(self._board.regions, robot.outcomes, robot.contexts, goals, errors))
+        try:
+            from sgimd_torch.extras.pictures.pictures import maps_of
+
+            self._board.show_pictures(maps_of(self._board.regions, robot.outcomes, robot.contexts, goals, errors))
+        except Exception as error:  # a font, a backend, a disk
+            say(f"the board has no pictures after {movements} movements: {reason_of(error)}")

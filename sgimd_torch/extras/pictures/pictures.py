@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, Final
 
 import numpy as np
-from matplotlib import rc_context
+from matplotlib import style
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
@@ -79,7 +79,7 @@ def _competence(ax: Axes, regions: Sequence[Region], section: Section) -> None:
 def _pixels(picture: Callable[[Axes, Section], object], maps: Sequence[Section]) -> NDArray[np.uint8]:
     """The pixels of a picture with its sections side by side, as large as TensorBoard shows it."""
     size = (4.2 * len(maps), maps[0].height(WIDE) + MARGIN)
-    with rc_context(STYLE):
+    with style.context(STYLE, after_reset=True):
         figure = Figure(size, dpi=120, layout="compressed")
         for ax, section in zip(figure.subplots(1, len(maps), squeeze=False).flat, maps, strict=True):
             picture(ax, section)

@@ -14,7 +14,7 @@ from functools import wraps
 from typing import Any, Concatenate, Final, ParamSpec
 
 import numpy as np
-from matplotlib import rc_context
+from matplotlib import style
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -51,7 +51,7 @@ def png(draw: Callable[Concatenate[Figure, P], None]) -> Callable[P, str]:
     @wraps(draw)
     def address(*args: P.args, **kwargs: P.kwargs) -> str:
         content = io.BytesIO()
-        with rc_context(STYLE):
+        with style.context(STYLE, after_reset=True):
             figure = Figure(figsize=(6, 5.2), layout="constrained")
             draw(figure, *args, **kwargs)
             figure.savefig(content, format="png", dpi=120, pil_kwargs={"optimize": True})

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
-from matplotlib import rc_context
+from matplotlib import style
 from matplotlib.figure import Figure
 
 from sgimd_torch.files import write_bytes
@@ -35,6 +35,6 @@ def save_figure(draw: Callable[[], Figure], path: Path) -> None:
         OSError: the file cannot be written.
     """
     kind, content = path.suffix[1:], io.BytesIO()
-    with rc_context(STYLE):
+    with style.context(STYLE, after_reset=True):
         draw().savefig(content, format=kind, dpi=DPI, metadata={"Date": None} if kind == "svg" else {})
     write_bytes(path, content.getvalue())

@@ -58,7 +58,7 @@ def test_a_goal_is_answered_in_a_line_and_executed_if_wanted(path, lived, capsys
 
 
 def test_many_goals_go_in_and_out_as_tables_whose_numbers_are_exact(path, lived, tmp_path, capsys):
-    (tmp_path / "goals.csv").write_text("x,y\n0.3,0.4\n\n-0.5,0.1\n")
+    (tmp_path / "goals.csv").write_text("0.3,0.4\n\n-0.5,0.1\n", encoding="utf-8-sig")  # Excel begins with a BOM
     out = tmp_path / "answers.csv"
     assert command(main, [str(path), "--goals", str(tmp_path / "goals.csv"), "--out", str(out)]) == 0
     rows = table_of(out)

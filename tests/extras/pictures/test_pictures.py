@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from boards import board_of, pictures_of
@@ -47,6 +48,15 @@ def test_pictures_tell_small_errors_apart_and_cut_off_no_label(high, context, wo
         assert (drawn[less] != drawn[more])[40:, :half].any()  # below the title, left of the colour bar
 
 
+def test_pictures_do_not_depend_on_the_matplotlibrc_of_the_user():
+    space, goals = Box.cube(-1, 1, 2), stream(0, "goals").random((4, 2))
+    drawn = []
+    for settings in ({}, {"text.usetex": True, "font.size": 30}):  # there need be no LaTeX
+        with rc_context(settings):
+            drawn.append(pictures.maps_of([], space, Box.cube(0, 1, 0), goals, goals[:, 0])["map/error"])
+    assert np.array_equal(*drawn)
+
+
 OPTIONS = ("--movements", "160", "--evaluate_at", "60,120", "--board", "true")
 
 
@@ -70,3 +80,12 @@ def test_outcomes_of_any_dimension_or_named_like_a_formula_have_pictures(own, mo
     words = f"--environment {robot} --algorithm sagg-riac --movements 60 --evaluate-at 30 --repeats 0 --out runs"
     assert command(main, [*words.split(), "--board", "true"]) == 0
     assert pictures_of(Path("runs/sagg-riac/seed-000")).keys() == {"map/error", "map/competence"}
+
+
+def test_a_picture_that_fails_ends_no_run(tmp_path, go, monkeypatch, capsys):
+    def no_font(*_):
+        raise OSError("no font")
+
+    monkeypatch.setattr(pictures, "maps_of", no_font)
+    assert go(tmp_path, *OPTIONS) == 0
+    assert "the board has no pictures after 60 movements: OSError: no font" in capsys.readouterr().err
