@@ -9,7 +9,6 @@ rows of other learning.
 
 from __future__ import annotations
 
-import fcntl
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -103,6 +102,10 @@ def merge(folder: Path, name: str, rows: Sequence[Row]) -> None:
     """
     make_folder(folder)
     n_key, columns = TABLES[name]
+    try:
+        import fcntl
+    except ImportError as error:  # Windows
+        raise ResultsError("experiments lock their tables as Linux and macOS do; run them there") from error
     with open(folder / ".lock", "w") as held:
         fcntl.flock(held, fcntl.LOCK_EX)  # waits until no other process changes a table of this folder
         table = read_table(folder, name)

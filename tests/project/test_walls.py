@@ -199,6 +199,13 @@ def test_a_circle_is_found():
     assert circle({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == []
 
 
+def test_no_file_imports_what_windows_lacks():
+    lacking = re.compile(r"^\s*(import|from) (fcntl|termios|pwd|grp|resource|pty)\b", re.MULTILINE)
+    files = [*Path(sgimd_torch.__file__).parent.rglob("*.py")]
+    assert not [path for path in files if lacking.search(path.read_text(encoding="utf-8"))]
+    assert lacking.search("x = 1\n    import fcntl\n")
+
+
 def test_there_are_few_rooms_and_no_folder_is_crowded():
     package = Path(sgimd_torch.__path__[0])
     folders = {path for path in package.iterdir() if path.is_dir() and list(path.glob("*.py"))}

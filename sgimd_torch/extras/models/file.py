@@ -5,12 +5,14 @@ robot = load_model(Path("arm.xml"), (), "auto", "", ()); robot.model, robot.star
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Final, NamedTuple
 from xml.etree import ElementTree
+from xml.parsers import expat
 
 import mujoco
 import numpy as np
@@ -25,6 +27,9 @@ from sgimd_torch.texts import unknown_name_error
 
 SERVOS: Final = ("auto", "file", "made")
 _FOLDERS: Final = ("assetdir", "meshdir", "texturedir")  # attributes of a compiler
+_COPIED: Final = ("replicate", "composite", "flexcomp")  # elements that MuJoCo makes ``count`` times
+MOST_PARTS: Final = 100_000  # largest number of elements of a model, copies included
+HEIGHTS: Final = 1000  # number of heights of a field that count as one element
 _HOMES: Final = ("home", "rest")  # names of keyframes in which movements begin unless another one is chosen
 
 
@@ -78,7 +83,7 @@ def _load(path: Path, joints: Sequence[str], servos: str, keyframe: str, posture
         raise unknown_name_error("servos", servos, SERVOS)
     if path.suffix.lower() == ".sdf":
         raise ValueError(f"{path.name} is an SDF file; MuJoCo reads MJCF and URDF, so give the robot's URDF")
-    with suppress(ElementTree.ParseError):  # MuJoCo says where
+    with suppress(expat.ExpatError):  # MuJoCo says where
         _check_parts(path)
     remarks, slow, accelerations = list[str](), dict[str, float](), dict[str, float]()
     try:
@@ -130,19 +135,25 @@ def _load(path: Path, joints: Sequence[str], servos: str, keyframe: str, posture
         speeds |= {name: min(speed, speeds.get(name, np.inf)) for name, speed in slow.items()}
         parts = sorted({file.resolve() for file in files if file.is_file()})
         return Loaded(model, data, kept, speeds, accelerations, remarks, parts)
-    except (ValueError, ElementTree.ParseError) as error:
+    except (ValueError, expat.ExpatError) as error:
         raise ValueError(f"{path.name} cannot be used: {_with_advice(' '.join(str(error).split()), path)}") from error
 
 
 def _check_parts(path: Path) -> None:
-    """Refuse a pipe or a device among the files that a model includes or refers to; MuJoCo would wait for them."""
-    elements, known = [*_root(path).iter()], {path}
+    """Refuse what MuJoCo would wait for, a pipe or a device that the model refers to, a model that is too large for it,
+    and a template of ROS."""
+    elements, known, n_parts = [*_root(path).iter()], {path}, _n_parts(_root(path))
     for element in elements:  # grows
+        if element.tag.startswith("xacro:") or any("${" in text or "$(" in text for text in element.attrib.values()):
+            raise ValueError(f"{path.name} is a template of xacro; give its result: xacro {path.name} > robot.urdf")
         included = path.parent / element.get("file", "")
         if element.tag == "include" and included not in known and included.exists() and not included.is_dir():
             check_regular(included)
             known.add(included)
             elements += _root(included).iter()
+            n_parts += _n_parts(_root(included))
+    if n_parts > MOST_PARTS:
+        raise _too_large(path)
     compilers = [element.attrib for element in elements if element.tag == "compiler"]
     folders = {path.parent / compiler.get(kind, "") for compiler in compilers for kind in _FOLDERS} | {path.parent}
     for element in elements:
@@ -152,9 +163,31 @@ def _check_parts(path: Path) -> None:
                     check_regular(mesh)
 
 
+def _n_parts(root: ElementTree.Element) -> float:
+    """Number of elements, copies included; the heights of a field count, too."""
+    n, waiting = 0.0, [(root, 1)]
+    while waiting:
+        element, copies = waiting.pop()
+        numbers = {name: [int(word) for word in text.split() if word.isdigit()] for name, text in element.items()}
+        copies *= math.prod(numbers.get("count", ())) if element.tag in _COPIED else 1
+        n += copies + math.prod([*numbers.get("nrow", [0]), *numbers.get("ncol", [0])]) / HEIGHTS
+        waiting += [(child, copies) for child in element]
+    return n
+
+
+def _too_large(path: Path) -> ValueError:
+    most = f"{MOST_PARTS} elements, or {MOST_PARTS * HEIGHTS:.0e} heights of a field"
+    return ValueError(f"{path.name} has more than {most}: too large to move a robot in it; was a count mistyped?")
+
+
 def _root(path: Path) -> ElementTree.Element:
-    """The first tag of a file; as for MuJoCo, blanks around it do no harm."""
-    return ElementTree.fromstring(path.read_bytes().strip(b"\0 \t\r\n"))
+    """The first tag of a file. As for MuJoCo, blanks around it do no harm, nor does a prefix without a namespace."""
+    content, builder, parser = path.read_bytes().strip(b"\0 \t\r\n"), ElementTree.TreeBuilder(), expat.ParserCreate()
+    if content.count(b"<") > 4 * MOST_PARTS:
+        raise _too_large(path)
+    parser.StartElementHandler, parser.EndElementHandler = builder.start, builder.end
+    parser.Parse(content, True)
+    return builder.close()
 
 
 def _reset(model: mujoco.MjModel, keyframe: str) -> mujoco.MjData:
@@ -226,7 +259,8 @@ def _with_advice(said: str, path: Path) -> str:
     advice = {
         "balanceinertia": _write('balanceinertia="true"', path),
         "mjMINVAL": _write('boundmass="1e-4" boundinertia="1e-6"', path),
-        "find decoder": "; MuJoCo reads models as MJCF or URDF, and meshes as .stl, .obj or .msh",
+        "decoder": "; MuJoCo reads MJCF or URDF, and meshes as .stl, .obj or .msh: convert it, or leave it out",
+        "opening file": "; put it beside the model, or into its meshdir, or leave it out",
     }
     return said + "".join(text for word, text in advice.items() if word in said)
 

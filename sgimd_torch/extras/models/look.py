@@ -18,6 +18,7 @@ NEARLY: Final = 1e-3  # share of a side of Pi by which two nearly equal thetas d
 MISSED: Final = 0.05  # rad or m, distance between a joint and its last command that counts
 OFTEN: Final = 0.2  # share of movements with such a distance from which on it is told
 SUNK: Final = 0.02  # m or rad; a place that moves farther while the robot holds still is told
+FLAT: Final = 1e-6  # share of a side of T; a dimension in which outcomes differ by less never changes
 APART: Final = 0.1  # share of T's longest side; nearly equal thetas with outcomes farther apart are told
 _HOPELESS: Final = 0.1  # share of such pairs that is told
 _PARTS: Final = 4  # number of parts of each side of T whose visits are counted
@@ -49,14 +50,21 @@ def missed(model: mujoco.MjModel, joints: Sequence[int], ends: Array, commands: 
 
 
 def reached(outcomes: Array, space: Box) -> list[str]:
-    """How much of T movements reach, and whether nearly equal ones end far apart: ``outcomes`` ``(n, 2, dim)``."""
+    """How much of T movements reach, what never changes, and whether nearly equal movements end far apart.
+
+    Args:
+        outcomes: ``(n, 2, dim)``, outcomes of movements, and of others nearly equal to them.
+        space: T.
+    """
+    flat = [space.axis(k) for k in np.flatnonzero(np.ptp(outcomes[:, 0], axis=0) < FLAT * space.sides).tolist()]
     far = np.linalg.norm(np.diff(outcomes, axis=1)[:, 0], axis=1) > APART * space.sides.max()
     cells = np.floor((outcomes[:, 0] - space.low) / space.sides * _PARTS)
     inside = cells[((cells >= 0) & (cells < _PARTS)).all(axis=1)]
     visits = np.sort(np.unique(inside, axis=0, return_counts=True)[1])[::-1]
     half = int((np.cumsum(visits) < len(inside) / 2).sum()) + 1
     line = f"{len(cells)} random movements reach {len(visits)} of {_PARTS**space.dim} equal parts of T; half end in"
-    return [f"{line} {half}"] + [
+    lines = [f"{line} {half}", *[f"{listed(flat)} never changes; leave it out, as in site:tip:xy"] * bool(flat)]
+    return lines + [
         f"{100 * far.mean():.0f} % of nearly equal movements end far apart, so nothing can be learnt of them: move "
         "fewer --environment.joints, lengthen --environment.durations, or put away what the robot hits"
     ] * bool(far.mean() >= _HOPELESS)

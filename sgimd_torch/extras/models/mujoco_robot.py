@@ -427,9 +427,12 @@ class MujocoRobot:
             if names:
                 lines.append(f"holding still, the robot touches itself: {listed(names)}; give --environment.keyframe")
             if sunk > SUNK:
+                free = mujoco.mjtJoint.mjJNT_FREE in {int(self.model.jnt_type[joint]) for joint in self._above}
                 endless = all(slides_on(self.model, joint_of(self.model, k)) for k in self._actuators)
-                advice = "; its commands are no positions: --environment.servos made holds it"
-                advice = "" if self.joints or endless else advice
+                why = "its servos yield to its weight" if self.joints else "its commands are no positions"
+                advice = "" if endless else f"; {why}: --environment.servos made holds it"
+                floor = "; its base is free: write a floor into the model, or take the free joint away"
+                advice = floor if free else advice
                 lines.append(f"holding still, what is measured moves by {self.outcomes.amount(sunk, '.2g')}{advice}")
         contexts, thetas = self._drawn("look", LOOKED)
         signs = [stream(0, "signs", k).choice([-1, 1], self.policies.dim) for k in range(LOOKED)]

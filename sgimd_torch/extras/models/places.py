@@ -83,6 +83,9 @@ def outcome_places(model: mujoco.MjModel, outcome: str) -> list[Place]:
             raise ValueError(f"outcome {text!r}: {axes!r} are no axes; write some of x, y and z, for a joint nothing")
         axes = axes or _AXES if kind != "joint" else ""
         places.append(replace(place, axes=tuple(map(_AXES.index, axes))))
+    measured = [(place.kind, place.number, axis) for place in places for axis in place.axes or [0]]
+    if len({*measured}) < len(measured):
+        raise ValueError(f"outcome {outcome!r} names a coordinate twice; leave one out")
     if len({place.unit for place in places}) > 1:
         raise ValueError(f"outcome {outcome!r} mixes lengths (m) and angles (rad); a goal needs one unit")
     return places
@@ -120,6 +123,8 @@ def context_box(model: mujoco.MjModel, context: str) -> tuple[Box, list[int]]:
         names.append(name if place.unit == "m" else f"{name} ({place.unit})")
         units.append(place.unit)
         addresses.append(address)
+    if len({*addresses}) < len(addresses):
+        raise ValueError(f"context {context!r} names a position twice; leave one out")
     lows, highs = np.array(sides).reshape(-1, 2).T
     return Box(lows, highs, tuple(names), "m" if {*units} == {"m"} else ""), addresses
 

@@ -94,6 +94,23 @@ def test_the_motors_of_the_file_let_it_fall_and_a_remark_says_so(here):
     assert falls.endswith("--environment.servos made holds it")
 
 
+def test_a_free_base_that_falls_and_an_outcome_that_never_changes_are_told_before_the_first_movement(here):
+    (here / "ship.xml").write_text(SHIP.replace("0 0 0", "0 0 -9.81", 1))
+    ship, arm = (
+        " ".join(MujocoRobot(name, outcome=place, low=[-9] * 3, high=[9] * 3).remarks)
+        for name, place in (("ship.xml", "body:ship"), ("arm.xml", "site:r:tip:x:xyz"))
+    )
+    assert "its base is free: write a floor into the model" in ship
+    assert "its base is free" not in arm
+    assert "r:tip:x y (m) never changes; leave it out" in arm
+
+
+def test_an_attribute_whose_prefix_has_no_namespace_is_read_as_mujoco_reads_it(here):
+    (here / "arm.urdf").write_text(URDF.replace('effort="30"', 'drake:acceleration="2" effort="30"'))
+    robot = MujocoRobot("arm.urdf", outcome="body:tool:xz", low=(-1, -1), high=(1, 1))
+    assert robot.joints == ("shoulder", "elbow")
+
+
 def test_what_slides_without_a_range_is_not_said_to_be_held_by_servos(here):
     (here / "cart.xml").write_text(CART.replace("<worldbody>", '<option gravity="1 0 0"/><worldbody>'))
     robot = MujocoRobot("cart.xml", outcome="body:cart:x", servos="file", low=(-1,), high=(1,))
@@ -185,6 +202,9 @@ def test_an_arm_that_a_mocap_body_pulls_is_moved_by_its_joints_if_asked_for(here
         ({"posture": (0.0,)}, "posture must have shape (..., 3)"),
         ({"model": "cart.xml", "outcome": "body:cart:x"}, "slides without a range stay where they are: x;"),
         ({"model": "gate.xml", "outcome": "body:turner", "low": (), "high": ()}, "does it lie on the axis"),
+        ({"outcome": "site:r:tip:x:x,site:r:tip:x:xz"}, "names a coordinate twice"),
+        ({"outcome": "joint:r:1,joint:r:1"}, "names a coordinate twice"),
+        ({"context": "joint:swing:0:1,joint:swing:0:1"}, "names a position twice"),
     ],
 )  # fmt: skip
 def test_a_slip_is_told_with_its_cause(here, options, said):
@@ -201,12 +221,31 @@ def test_a_slip_is_told_with_its_cause(here, options, said):
             'write <mujoco><compiler boundmass="1e-4" boundinertia="1e-6"/></mujoco>',
         ),
         (("</robot>", LOST), "put the folder lost there"),
+        (("</robot>", LOST.replace("package://lost/a.stl", "tool.dae")), "convert it, or leave it out"),
+        (("</robot>", LOST.replace("package://lost/a.stl", "tool.stl")), "put it beside the model, or into"),
+        (("0.3 0 0", "${length} 0 0"), "is a template of xacro; give its result: xacro arm.urdf > robot.urdf"),
+        (('<link name="base"/>', '<xacro:base/><link name="base"/>'), "is a template of xacro"),
     ],
 )
 def test_what_mujoco_refuses_in_a_urdf_is_told_with_where_to_write_the_cure(here, change, said):
+    (here / "tool.dae").write_text("<COLLADA/>")
     (here / "arm.urdf").write_text(URDF.replace(*change))
     with pytest.raises(ValueError, match=re.escape(said)):
         MujocoRobot("arm.urdf", outcome="body:upper:xz")
+
+
+@pytest.mark.parametrize(
+    "huge",
+    [
+        '<worldbody><replicate count="3000"><replicate count="1000"><body/></replicate></replicate></worldbody>',
+        '<asset><hfield name="h" nrow="60000" ncol="60000" size="1 1 1 1"/></asset>',
+        "<worldbody>" + '<body><geom size=".1"/></body>' * 300_000 + "</worldbody>",
+    ],
+)
+def test_a_model_that_is_too_large_for_memory_or_patience_is_refused_before_it_is_made(here, huge):
+    (here / "huge.xml").write_text(f"<mujoco>{huge}</mujoco>")
+    with pytest.raises(ValueError, match=r"huge\.xml has more than 100000 elements, or 1e\+08 heights of a field"):
+        MujocoRobot("huge.xml", outcome="body:arm")
 
 
 def test_goals_lie_where_postures_without_contacts_put_the_place(here):
