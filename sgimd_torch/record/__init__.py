@@ -55,7 +55,8 @@ class Record(AbstractContextManager["Record"]):
     """An existing record, open for reading and, on request, for writing; a context manager.
 
     A reader copies the file into its memory at once. So it keeps no lock, and sees one state of the file. A writer
-    keeps a write-ahead log beside the file until ``close``, so no reader delays a commit.
+    keeps a write-ahead log beside the file until ``close``, so no reader delays a commit. Each commit enters the file,
+    too, so a copy of the file alone has all commits.
 
     Args:
         path: SQLite file.
@@ -193,6 +194,8 @@ class Record(AbstractContextManager["Record"]):
                     self._connection.execute("PRAGMA journal_mode = WAL")
                     self._log_waits = False
                     self._version = self._connection.execute("PRAGMA data_version").fetchone()  # the log changed it
+            with suppress(sqlite3.OperationalError):  # what cannot enter the file now is still in the log
+                self._connection.execute("PRAGMA wal_checkpoint(PASSIVE)")
             self._lock()
         return True
 

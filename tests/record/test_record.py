@@ -1,6 +1,7 @@
 """The record: floats come back exactly, one writer at a time, all of a commit or nothing; no damage goes unnoticed."""
 
 import sqlite3
+import subprocess
 
 import numpy as np
 import pytest
@@ -105,6 +106,17 @@ def test_a_reader_beside_a_writer_sees_whole_commits(tmp_path):
         assert list(record.rows("goals")) == [(0, 0.25, 0.25)]  # the writer sees what it has written
         assert "seconds" not in dict(read(path)["about"])
     assert "seconds" not in dict(read(path)["about"])  # closed without a commit
+
+
+def test_a_copy_of_the_file_alone_has_all_commits_while_the_run_writes(tmp_path):
+    path, copy = fill(tmp_path / "run.sqlite"), tmp_path / "copy" / "run.sqlite"
+    copy.parent.mkdir()
+    with Record(path, write=True) as record:
+        for _ in range(3):
+            record.add(moved([0.1, 0.2, 0.3]))
+            record.commit()
+        subprocess.run(["cp", path, copy], check=True)  # opened here, the file would lose its locks
+        assert read(copy) == read(path)
 
 
 @pytest.mark.parametrize("spilt", [False, True])

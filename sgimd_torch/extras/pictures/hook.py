@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from sgimd_torch.environments.protocol import reason_of
 from sgimd_torch.runs.hooks import Hook, Listener
 from sgimd_torch.runs.messages import say
 
@@ -46,4 +45,6 @@ class Drawing(Listener):
 
             self._board.show_pictures(maps_of(self._board.regions, robot.outcomes, robot.contexts, goals, errors))
         except Exception as error:  # a font, a backend, a disk
+            from sgimd_torch.environments.protocol import reason_of
+
             say(f"the board has no pictures after {movements} movements: {reason_of(error)}")
