@@ -5,7 +5,9 @@ write_checkpoint(directory, model, refresh); ForwardModel.load_from_checkpoint(d
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Sequence
+from functools import reduce
 from pathlib import Path
 from typing import Any, Final
 
@@ -35,6 +37,7 @@ def write_checkpoint(directory: Path, model: ForwardModel, refresh: Row) -> None
         "guides": model.guides,
     }
     model.on_save_checkpoint(checkpoint)
+    checkpoint["crc32"] = _crc32(checkpoint)
     path = directory / CHECKPOINT
     make_folder(path.parent)
     with replacing(path) as partial:
@@ -57,13 +60,16 @@ def read_checkpoint(directory: Path, model: ForwardModel, refreshes: Sequence[Ro
         return {}
     try:
         checkpoint: dict[str, Any] = torch.load(path, map_location="cpu", weights_only=True)
+        written, right = checkpoint.pop("crc32", None), _crc32(checkpoint)
         made_by, made_with, weights = (checkpoint[name] for name in ("made_by", "hyper_parameters", "state_dict"))
         shapes = {name: values.shape for name, values in weights.items()}
         complete = {"refresh", "guides", "online"} <= checkpoint.keys()
     except Exception as error:  # torch raises many kinds
-        raise RunError(f"{path} cannot be read as a checkpoint: {str(error).partition(chr(10))[0]}") from error
+        raise RunError(f"{path} cannot be read as a checkpoint: it is damaged, or another file") from error
     if made_by != __version__ or not complete:
         raise RunError(f"{path} was written by version {made_by}, this is {__version__}")
+    if written != right:
+        raise RunError(f"{path} is not what was written: its weights or other values were changed")
     own = dict(model.hparams)
     if others := [name for name in {**own, **made_with} if made_with.get(name) != own.get(name)]:
         told = ", ".join(f"{name} {made_with.get(name)}, here {own.get(name)}" for name in others)
@@ -75,3 +81,14 @@ def read_checkpoint(directory: Path, model: ForwardModel, refreshes: Sequence[Ro
     if refresh[0] <= refreshes[-1][0]:
         raise RunError(f"{path} is of another run")
     return {}
+
+
+def _crc32(value: Any, crc: int = 0) -> int:
+    """Checksum of the content of a checkpoint: tensors, and what dictionaries and lists have."""
+    if isinstance(value, torch.Tensor):
+        return zlib.crc32(value.detach().cpu().numpy().tobytes(), zlib.crc32(f"{value.dtype}{value.shape}".encode(), crc))
+    if isinstance(value, dict):
+        return reduce(lambda crc, item: _crc32([*item], crc), value.items(), crc)
+    if isinstance(value, list | tuple):
+        return reduce(lambda crc, each: _crc32(each, crc), value, crc)
+    return zlib.crc32(repr(value).encode(), crc)

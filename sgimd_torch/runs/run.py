@@ -42,7 +42,7 @@ def run_one(parts: RunParts, stopping: Stopping, *, resume: bool, again: str) ->
 
     Raises:
         ValueError, OSError: the run cannot begin.
-        Failed: the run failed after its beginning.
+        Failed: the run failed after its beginning, or most of its movements did.
         Stopped: a signal stopped the run.
     """
     with RunLoop(parts, resume=resume) as loop:
@@ -63,6 +63,8 @@ def run_one(parts: RunParts, stopping: Stopping, *, resume: bool, again: str) ->
             if isinstance(error, NoOutcomeError):
                 said += " (--failures says how many in a row end a run)"
             raise Failed(f"{said}; {loop.record.movements} movements are kept; to go on: {again}") from error
+        if 2 * loop.failed > loop.movements:
+            raise Failed(f"{loop.summary}; most movements failed, so little was learnt: does the robot work?")
         return loop.summary
 
 

@@ -19,7 +19,7 @@ from runs import ROOT, about_of, content_of, write_about
 from sgimd_torch.board.legend import LEGEND
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import Benchmark, save_benchmark
-from sgimd_torch.forward_model.checkpoints import CHECKPOINT, write_checkpoint
+from sgimd_torch.forward_model.checkpoints import CHECKPOINT, _crc32, write_checkpoint
 from sgimd_torch.forward_model.model import ForwardModel
 from sgimd_torch.forward_model.shared import ModelListener
 from sgimd_torch.inverses.nearest import NearestNeighbour
@@ -170,7 +170,24 @@ def of_another_robot(path):
 
 
 def changed(**entries):
-    return lambda path: torch.save({**torch.load(path), **entries}, path)
+    def spoil(path):
+        checkpoint = {**torch.load(path), **entries}
+        del checkpoint["crc32"]
+        torch.save({**checkpoint, "crc32": _crc32(checkpoint)}, path)
+
+    return spoil
+
+
+def weights(change):
+    """Other weights, as an editor or a bad disk leaves them: the checksum is that of before."""
+
+    def spoil(path):
+        checkpoint = torch.load(path)
+        name = next(name for name, values in checkpoint["state_dict"].items() if values.is_floating_point())
+        checkpoint["state_dict"][name] = change(checkpoint["state_dict"][name])
+        torch.save(checkpoint, path)
+
+    return spoil
 
 
 @pytest.mark.parametrize(
@@ -178,6 +195,9 @@ def changed(**entries):
     [
         (lambda path: path.write_bytes(path.read_bytes()[:1000]), "cannot be read as a checkpoint: "),
         (of_another_robot, "is of another model: theta_dim 8, here 7"),
+        (lambda path: torch.save([print], path), "cannot be read as a checkpoint: it is damaged, or another file"),
+        (weights(lambda values: values * 1.01), "is not what was written"),
+        (weights(lambda values: values * math.nan), "is not what was written"),
         (changed(made_by="0.1"), "was written by version 0.1, this is "),
         (changed(refresh=[150, 150, 50, 0.1]), "is of another run"),
         (changed(state_dict={}), "has weights of other shapes"),
