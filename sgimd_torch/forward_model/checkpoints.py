@@ -86,7 +86,8 @@ def read_checkpoint(directory: Path, model: ForwardModel, refreshes: Sequence[Ro
 def _crc32(value: Any, crc: int = 0) -> int:
     """Checksum of the content of a checkpoint: tensors, and what dictionaries and lists have."""
     if isinstance(value, torch.Tensor):
-        return zlib.crc32(value.detach().cpu().numpy().tobytes(), zlib.crc32(f"{value.dtype}{value.shape}".encode(), crc))
+        crc = zlib.crc32(f"{value.dtype}{value.shape}".encode(), crc)
+        return zlib.crc32(value.detach().cpu().numpy().tobytes(), crc)
     if isinstance(value, dict):
         return reduce(lambda crc, item: _crc32([*item], crc), value.items(), crc)
     if isinstance(value, list | tuple):

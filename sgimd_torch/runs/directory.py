@@ -157,9 +157,14 @@ def build_again(config: Config, record: Path | None) -> RunParts:
 
     Raises:
         ValueError, FileNotFoundError: see ``build``.
+        RunError: a file that the run on disk needs is gone.
     """
     try:
         return build(config, record)
+    except FileNotFoundError as error:
+        if record is None:
+            raise
+        raise RunError(f"{record.parent} needs {error.filename}, which is gone; put it back") from error
     except ValueError as error:
         if record is None or config.values.get(DEVICE, "auto") == "auto":
             raise

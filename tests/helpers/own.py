@@ -57,6 +57,13 @@ class OtherPicture(Slider):
     def trace(self, context, theta, rng):
         return Sketch(np.zeros(2), 0.1, [np.zeros((5, 1, 2))])
 
+class OftenLost(Slider):
+    """It fails three times in four."""
+    def execute(self, context, theta, rng):
+        if theta[0] > 0.25:
+            raise KeyError("elbow")
+        return super().execute(context, theta, rng)
+
 class LostPicture(Slider):
     def trace(self, context, theta, rng):
         return {}["where"]

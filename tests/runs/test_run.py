@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 
 from runs import ROOT, content_of
+from sgimd_torch.__main__ import _call
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
 from sgimd_torch.runs import evaluations
 from sgimd_torch.runs.build import build
 from sgimd_torch.runs.messages import ProgressBar
+from sgimd_torch.runs.program import command
 from sgimd_torch.runs.read import config_of, read_run
 from sgimd_torch.spaces import Demonstration
 
@@ -112,3 +114,10 @@ def test_the_time_that_is_left_counts_evaluations(monkeypatch, capsys):
         clock[0] = 60.0  # 50 movements in 50 s, and evaluations of 10 s
         progress.show(50)
     assert "50 of 100 movements, 0.833/s, 01:00 left" in capsys.readouterr().err
+
+
+def test_a_run_most_of_whose_movements_failed_says_so_and_fails(own, capsys):
+    words = "run --environment sliders:OftenLost --algorithm random --movements 20 --evaluate-at null --failures 99"
+    assert command(_call, words.split()) == 1
+    assert re.search(r"\((1[1-9]|20) failed\).*most movements failed, so little was learnt", capsys.readouterr().err)
+    assert read_run("runs/random/seed-000").summary["movements"] == 20

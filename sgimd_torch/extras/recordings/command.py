@@ -45,9 +45,9 @@ from sgimd_torch.environments.protocol import (
     tried,
 )
 from sgimd_torch.extras.recordings.columns import ColumnNames, Recording
-from sgimd_torch.extras.recordings.limits import beyond_limits
+from sgimd_torch.extras.recordings.limits import beyond_limits, implausible
 from sgimd_torch.extras.recordings.text import read_text
-from sgimd_torch.extras.recordings.units import in_units, paced, units_from
+from sgimd_torch.extras.recordings.units import in_units, paced, units_from, unwrapped
 from sgimd_torch.extras.table.results import print_table
 from sgimd_torch.files import check_regular, check_writable
 from sgimd_torch.options.parse import parse
@@ -115,6 +115,9 @@ def parser() -> argparse.ArgumentParser:
         "rad leaves commands alone (default: rad, unless a joint reads more than a turn)",
     )
     source.add_argument("--speed", type=_above_zero, default=1.0, help="factor on the speed (default: %(default)s)")
+    joined = "joints logged in (-pi, pi] whose jumps by a turn are taken away"
+    source.add_argument("--unwrap", type=_names, default=(), metavar="JOINT,JOINT", help=joined)
+    source.add_argument("--strict", action="store_true", help="recordings with remarks cannot be used")
     source.add_argument("--trim", action="store_true", help="cut off stillness before and after the movement")
     described: dict[str, Any] = {"description": __doc__, "formatter_class": argparse.RawDescriptionHelpFormatter}
     parser = parser_of("demonstrations", __doc__)
@@ -162,8 +165,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         record_led(task, options.out)
         return 0
     recordings = read_recordings(options, primitive_of(task.environment).ranges if task else None)
+    recordings = _looked_at(recordings, strict=options.strict)
     if task is not None:
-        recordings = _on_robot(task, recordings, options.source)
+        recordings = _on_robot(task, recordings, options.source, strict=options.strict)
     unusable, usable = ([rec for rec in recordings if bool(rec.fault) is faulty] for faulty in (True, False))
     if unusable:
         first = f"{unusable[0].name}: {unusable[0].fault}"
@@ -232,7 +236,7 @@ def read_recordings(options: argparse.Namespace, ranges: Box | None) -> list[Rec
         recordings, unclear = read_lerobot(source, _columns(options, ranges, "timestamp", "episode_index"))
     else:
         recordings = read_text(source, _columns(options, ranges, "time", None))
-    recordings = in_units(recordings, units, ranges, unclear=unclear)
+    recordings = unwrapped(in_units(recordings, units, ranges, unclear=unclear), options.unwrap)
     return [paced(recording, options.speed, trim=options.trim) for recording in recordings]
 
 
@@ -277,10 +281,27 @@ def check(task: Task, demonstration: Demonstration, row: int) -> Checked:
             remarks = beyond_limits(robot, demonstration)
     except (ValueError, SimulationError) as error:
         return Checked(demonstration, None, float("nan"), remarks, str(error))
-    return Checked(demonstration, lands, misfit_of(robot, theta, demonstration), remarks)
+    misfit, trajectory = misfit_of(robot, theta, demonstration), demonstration.trajectory
+    if misfit > np.sqrt(np.mean((trajectory - trajectory.mean(axis=0)) ** 2)):
+        remarks = [*remarks, "its misfit is no better than that of standing still: are joints and units right?"]
+    return Checked(demonstration, lands, misfit, remarks)
 
 
-def _on_robot(task: Task, recordings: Sequence[Recording], source: Path) -> list[Recording]:
+def _looked_at(recordings: Sequence[Recording], *, strict: bool) -> list[Recording]:
+    """The recordings; says which readings are not plausible, each kind once. If ``strict``, these cannot be used."""
+    named, after = dict[str, list[str]](), list[Recording]()
+    for recording in recordings:
+        shown = recording.demonstration
+        remarks = [] if shown is None else implausible(shown, recording.joints)
+        for remark in remarks:
+            named.setdefault(remark, []).append(recording.name)
+        fault = recording.fault or "; ".join(remarks) * strict
+        after.append(recording._replace(fault=fault, demonstration=None if fault else shown))
+    say(*(f"{remark} ({len(names)} of {len(recordings)}, first {names[0]})" for remark, names in named.items()))
+    return after
+
+
+def _on_robot(task: Task, recordings: Sequence[Recording], source: Path, *, strict: bool) -> list[Recording]:
     """The recordings after a check on the robot of the task; prints a line for each of them."""
     contexts = task.environment.contexts
     if contexts.dim and any(rec.demonstration and not rec.demonstration.context.size for rec in recordings):
@@ -295,7 +316,8 @@ def _on_robot(task: Task, recordings: Sequence[Recording], source: Path) -> list
             continue
         checked = check(task, recording.demonstration, row)
         table.append(_cells(recording.name, checked))
-        after.append(recording._replace(demonstration=checked.demonstration, fault=checked.fault))
+        fault = checked.fault or "; ".join(checked.remarks) * strict
+        after.append(recording._replace(demonstration=checked.demonstration, fault=fault))
         remarked += bool(checked.remarks)
         apart += [] if checked.lands is None else [checked.apart]
     print_table(table)

@@ -76,7 +76,9 @@ def read_lerobot(root: str | os.PathLike[str], names: ColumnNames) -> tuple[list
     recordings = recordings_of(Sheet(root.name, columns, range(n_rows), entries), names)
     for noun, key, n in (("frames", "total_frames", n_rows), ("episodes", "total_episodes", len(recordings))):
         if names.recording == "episode_index" and info.get(key) != n:
-            raise ValueError(f"{root} says {info.get(key)} {noun}, but {n} were found; is a file missing?")
+            more = isinstance(said := info.get(key), int) and n > said
+            slip = "was meta/info.json written before the last ones?" if more else "is a file missing?"
+            raise ValueError(f"{root} says {said} {noun}, but {n} were found; {slip}")
     robot = str(info.get("robot_type"))
     records = "records degrees or shares of a joint's range, -100..100, and of the gripper 0..100"
     return recordings, f"a robot {robot} {records}" if any(name in robot for name in _RECORD_SHARES) else ""

@@ -1,12 +1,32 @@
-"""Limits of a robot that a recording exceeds."""
+"""Limits of a robot that a recording exceeds, and joints whose readings are not plausible."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 
 from sgimd_torch.demonstrations.fit import slow_clock
 from sgimd_torch.environments.protocol import Environment, primitive_of
 from sgimd_torch.spaces import Demonstration
+
+MOVES: Final = 0.1  # rad, way of a joint that moves
+STUCK: Final = 1e-6  # rad, way of a joint that never moves
+TURN: Final = 2 * np.pi  # rad
+NEARLY: Final = 0.5  # rad, difference from a turn of a jump that counts as a turn
+
+
+def implausible(demonstration: Demonstration, joints: Sequence[str]) -> list[str]:
+    """Sentences, one for each of the ``joints`` (rad) that never moves while others do, or jumps by a turn."""
+    trajectory, remarks = demonstration.trajectory, list[str]()
+    ways, jumps = np.ptp(trajectory, axis=0), np.abs(np.diff(trajectory, axis=0)).max(axis=0)
+    for joint, way, jump in zip(joints, ways.tolist(), jumps.tolist(), strict=True):
+        if way <= STUCK and ways.max() > MOVES:
+            remarks.append(f"{joint} never moves while others do: was its encoder read?")
+        if abs(jump - TURN) < NEARLY:
+            remarks.append(f"{joint} jumps by a turn: --unwrap {joint} joins it")
+    return remarks
 
 
 def beyond_limits(environment: Environment, demonstration: Demonstration) -> list[str]:

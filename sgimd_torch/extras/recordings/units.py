@@ -85,6 +85,24 @@ def paced(recording: Recording, speed: float, *, trim: bool) -> Recording:
     return recording._replace(demonstration=replace(demonstration, times=times, trajectory=joints))
 
 
+def unwrapped(recordings: Sequence[Recording], names: Sequence[str]) -> list[Recording]:
+    """The recordings (rad) with the jumps by a turn of the joints ``names`` taken away.
+
+    Raises:
+        ValueError: a name is no joint.
+    """
+    joints = next((recording.joints for recording in recordings if recording.demonstration), ())
+    columns = [joints.index(joint) for joint in units_of(joints, dict.fromkeys(names, "rad"))]
+    joined = list[Recording]()
+    for recording in recordings:
+        if shown := recording.demonstration:
+            trajectory = shown.trajectory.copy()
+            trajectory[:, columns] = np.unwrap(trajectory[:, columns], axis=0)
+            recording = recording._replace(demonstration=replace(shown, trajectory=trajectory))
+        joined.append(recording)
+    return joined
+
+
 def moving(times: Array, joints: Array) -> tuple[Array, Array]:
     """The recording without the pauses before and after the movement; its times start at 0.
 

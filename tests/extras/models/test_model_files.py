@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from sgimd_torch import MujocoRobot, check_environment, stream
+from sgimd_torch.__main__ import _call
 from sgimd_torch.extras.models.posture import NEAR, nearest_posture
+from sgimd_torch.runs.program import command
 from sgimd_torch.tasks import Task, benchmark_of
 from sgimd_torch.tasks.goals import goals_all_over, goals_within_reach
 from urdf import URDF
@@ -300,3 +302,13 @@ def test_postures_keep_within_the_ranges_of_joints_and_move_only_joints_of_the_p
     robot.outcome_at(robot.start)
     assert np.ptp(upper.within_reach()) > 2
     assert upper._data[0].qpos[1] == pytest.approx(upper.start[1])
+
+
+def test_a_run_whose_model_file_is_gone_says_that_it_needs_it(here, capsys):
+    words = "run --environment mujoco --environment.model arm.xml --environment.outcome site:r:tip:x:xz"
+    words += " --environment.low=-1,-1 --environment.high 1,1 --algorithm random --movements 3 --evaluate-at null"
+    assert command(_call, words.split()) == 0
+    (here / "arm.xml").unlink()
+    for again in (f"{words} --resume", "ask runs/random/seed-000 --goal 0.1,0.1"):
+        assert command(_call, again.split()) == 2
+        assert re.search(r"error: \S*runs/random/seed-000 needs \S*arm\.xml, which is gone", capsys.readouterr().err)

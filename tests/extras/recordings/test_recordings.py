@@ -242,6 +242,23 @@ def test_recordings_of_a_file_of_ours_are_mended_too():
     np.testing.assert_allclose(shown.trajectory[[0, -1], 0], [0, 1], atol=1e-12)
 
 
+def test_a_joint_that_never_moves_or_jumps_by_a_turn_is_told_joined_when_asked_and_refused_when_strict(capsys):
+    turns, times = np.linspace(2.5, 4.5, 9), np.linspace(0, 2, 9)
+    logged = np.angle(np.exp(1j * turns))
+    rows = [f"{t},{a},{b},0.0,0.1,0.2" for t, a, b in zip(times, logged, turns, strict=True)]
+    Path("wrapped.csv").write_text("\n".join(["time,a,b,c,x,y", *rows]))
+    words = ("wrapped.csv", "--joints", "a,b,c", "--outcome", "x,y")
+    assert imported(*words)[0].trajectory[:, 0] == pytest.approx(logged)
+    said = capsys.readouterr().err
+    assert "a jumps by a turn: --unwrap a joins it (1 of 1" in said
+    assert "c never moves while others do" in said
+    assert "b " not in said
+    assert imported(*words, "--unwrap", "a")[0].trajectory[:, 0] == pytest.approx(turns)
+    assert "jumps" not in capsys.readouterr().err
+    assert imported(*words, "--strict") is None
+    assert "a jumps by a turn" in capsys.readouterr().err
+
+
 def test_one_long_table_is_cut_where_the_recording_changes(capsys):
     Path("long.csv").write_text(LONG)
     one, two = imported("long.csv", *OF_LONG)
@@ -376,6 +393,7 @@ HARMS = {
     r"is no LeRobot .*: it has no meta/info\.json": lambda root: (root / "meta").rename(root / "meta_data"),
     r"no feature observation\.state; .* It has action": lambda root: change(root, features={"action": None}),
     "says 4 episodes, but 3 were found; is a file missing": lambda root: change(root, total_episodes=4),
+    "says 14 frames, but 15 were found; was meta/info.json written": lambda root: change(root, total_frames=14),
     "says 15 frames, but 10 were found": lambda root: last(root).unlink(),
     r"info\.json is no json": lambda root: (root / "meta/info.json").write_text("{"),
     r"info\.json must hold an object": lambda root: (root / "meta/info.json").write_text("[]"),
