@@ -27,6 +27,9 @@ SHIPPED = Path(__file__).with_name("data") / "benchmark.npz"
 TILES: Final = 358  # number of goals in the paper's benchmark
 TOGETHER: Final = 128  # number of movements that an evaluation executes at once; Ctrl-C works between them
 RECENT: Final = 50  # number of latest goals, or movements, over which the results at the learner's own goals are taken
+NEAREST: Final = 10  # number of outcomes near a goal that say whether it lies beyond all
+ONE_SIDE: Final = 0.7  # share of their mean distance that their mean has, if they lie on one side
+FAR: Final = 0.03  # share of the diagonal of all outcomes
 SIDES: Final = np.linspace(0.025, 0.1, 301)  # sides of a tile to try, relative to T's: 1600 to 100 tiles in the plane
 
 
@@ -107,6 +110,23 @@ class Evaluation:
     def met(self, near: float) -> int:
         """The number of goals with an error of ``near`` or less."""
         return int((self.errors <= near).sum())
+
+
+def beyond(outcomes: Array, goals: Array) -> NDArray[np.bool_]:
+    """``(n,)``, whether each of the ``goals`` ``(n, dim)`` lies beyond all ``outcomes`` ``(m, dim)``.
+
+    Then the outcomes near it lie on one side of it, and none is nearer than 3 % of their diagonal.
+    """
+    if len(outcomes) < NEAREST:
+        return np.zeros(len(goals), bool)
+    outside, far = np.zeros(len(goals), bool), FAR * np.linalg.norm(np.ptp(outcomes, axis=0))
+    for k, goal in enumerate(goals):
+        ways = outcomes - goal
+        distances = np.linalg.norm(ways, axis=1)
+        near = np.argpartition(distances, NEAREST - 1)[:NEAREST]
+        one_side = np.linalg.norm(ways[near].mean(axis=0)) > ONE_SIDE * distances[near].mean()
+        outside[k] = one_side and distances[near].min() > far
+    return outside
 
 
 @dataclass

@@ -14,6 +14,7 @@ from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import (
     Benchmark,
     Evaluation,
+    beyond,
     contexts_of_goals,
     evaluate,
     load_benchmark,
@@ -227,3 +228,15 @@ def test_a_benchmark_of_another_robot_is_refused(wrong: Benchmark, message: str)
     load_benchmark().check(FishingRod(threads=1))
     with pytest.raises(ValueError, match=message):
         wrong.check(PlanarArm(5))
+
+
+def test_goals_beyond_all_outcomes_are_told_from_goals_among_them():
+    rng = stream(0, "outcomes")
+    outcomes = rng.uniform(-1, 1, (1000, 2))
+    disc = outcomes[np.linalg.norm(outcomes, axis=1) < 0.8]
+    goals = rng.uniform(-1, 1, (500, 2))
+    radii = np.linalg.norm(goals, axis=1)
+    outside = beyond(disc, goals)
+    assert outside[radii > 0.9].all()
+    assert not outside[radii < 0.78].any()
+    assert not beyond(disc[:5], goals).any()  # too few to say

@@ -15,6 +15,7 @@ from functools import partial
 from typing import Final
 
 from sgimd_torch.environments.protocol import FAILURES, SimulationError, reason_of
+from sgimd_torch.evaluation import beyond
 from sgimd_torch.learner.events import Event, Kind
 from sgimd_torch.record import ReplayError, RunError
 from sgimd_torch.runs.directory import has_ended, open_run
@@ -28,6 +29,7 @@ from sgimd_torch.session import NoOutcomeError, live, run
 from sgimd_torch.spaces import Episode
 
 N_TOLD: Final = 3  # number of failures with a message each; later ones are only counted
+BEYOND: Final = 0.1  # share of goals that look out of reach from which on the result tells their number
 COMMIT_EVERY: Final = 1.0  # s between two commits; a killed run loses the movements since the last commit
 
 
@@ -135,6 +137,10 @@ class RunLoop(AbstractContextManager["RunLoop"]):
             floor = last.noise_floor
             measured = "not measured" if math.isnan(floor) else amount(floor, ".4f")
             result = f"mean error {amount(last.mean_error, '.4f')}, noise floor {measured}"
+            outside = beyond(self.parts.learner.memory.outcomes, self.parts.benchmark.goals)
+            if BEYOND < outside.mean() < 1:
+                others = f"mean error at the others {amount(float(last.errors[~outside].mean()), '.4f')}"
+                result += f"; {outside.sum()} of {len(outside)} goals look out of reach, {others}"
             if last.failed.any():
                 result += f" ({last.failed.sum()} of {len(last.failed)} movements of the evaluation failed)"
         failed = f" ({self.failed} failed)" if self.failed else ""

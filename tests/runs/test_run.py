@@ -121,3 +121,14 @@ def test_a_run_most_of_whose_movements_failed_says_so_and_fails(own, capsys):
     assert command(_call, words.split()) == 1
     assert re.search(r"\((1[1-9]|20) failed\).*most movements failed, so little was learnt", capsys.readouterr().err)
     assert read_run("runs/random/seed-000").summary["movements"] == 20
+
+
+def test_the_last_line_gives_the_error_at_goals_within_reach_too(own, capsys):
+    words = "run --environment sliders:Slider2 --algorithm random --movements 60 --evaluate-at 60 --repeats 0"
+    assert command(_call, words.split()) == 0  # T is [-1, 3]^2, and outcomes lie in [0, 1]^2
+    all_of_t, n, goals, within = re.search(
+        r"mean error ([\d.]+), .*; (\d+) of (\d+) goals look out of reach, mean error at the others ([\d.]+)",
+        capsys.readouterr().out,
+    ).groups()
+    assert 0.8 < int(n) / int(goals) < 0.97
+    assert float(within) < 0.2 < 1 < float(all_of_t)

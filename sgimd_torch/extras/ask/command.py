@@ -28,8 +28,10 @@ import numpy as np
 
 from sgimd_torch.environments.motor_primitives import GaussianPrimitive
 from sgimd_torch.environments.protocol import execute_many, primitive_of
+from sgimd_torch.evaluation import beyond
 from sgimd_torch.files import check_writable, read_csv, write_text
 from sgimd_torch.runs.load import OpenRun
+from sgimd_torch.runs.messages import say
 from sgimd_torch.runs.program import Failed, parser_of
 from sgimd_torch.runs.run_parts import RunParts
 from sgimd_torch.spaces import Array, Box, Failure, stream
@@ -59,6 +61,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         raise ValueError("give --goal X,Y or --goals FILE; --trajectory takes one goal")
     run.recall()
     answers = list(_answers(parts, goals, options.context))
+    asked = np.stack([answer["goal"] for answer in answers])
+    for goal in asked[beyond(parts.learner.memory.outcomes, asked)]:
+        say(f"goal {_text(goal)} looks out of reach: all outcomes near it lie on one side of it")
     failed = list(_execute(parts, answers)) if options.execute else []
     if options.trajectory:
         _write_trajectory(options.trajectory, parts, answers[0]["theta"])

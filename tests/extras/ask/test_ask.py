@@ -70,6 +70,13 @@ def test_many_goals_go_in_and_out_as_tables_whose_numbers_are_exact(path, lived,
         assert float(row["expected_deviation"]) == estimate.expected_deviation
 
 
+def test_a_goal_beyond_all_outcomes_is_said_to_look_out_of_reach(path, capsys):
+    assert command(main, [str(path), "--goal", "0.3,0.4", "--goal", "1,1"]) == 0
+    said = capsys.readouterr().err
+    assert "goal 1,1 looks out of reach" in said
+    assert "goal 0.3" not in said
+
+
 ROBOT = """
 import os
 import numpy as np
