@@ -1,6 +1,7 @@
 """Signals: Ctrl-C and SIGTERM end a command cleanly.
 
 with Stopping() as stopping: ...    # the first signal is noted in stopping.heard, the second one raises Stopped
+reading = returned(robot.read, 5.0)    # a call that does not return in 5 s raises Overdue
 """
 
 from __future__ import annotations
@@ -52,6 +53,34 @@ class Stopping:
         self.heard = signum
         with suppress(OSError):  # say() could print into a print that the signal has interrupted
             os.write(2, f"\n{self._message}\n".encode())
+
+
+class Overdue(RuntimeError):
+    """A call has not returned in time."""
+
+
+def returned(call: Callable[[], Any], seconds: float) -> Any:
+    """The result of ``call``. In the main thread, a call that does not return in ``seconds`` is broken off, and told.
+
+    Raises:
+        Overdue: it was broken off.
+    """
+
+    def break_off(signum: int, frame: FrameType | None) -> None:
+        message = f"the driver has not returned for {seconds:g} s; its call is broken off"
+        with suppress(OSError):
+            os.write(2, f"\n{message}\n".encode())
+        raise Overdue(message)
+
+    if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "setitimer"):
+        return call()
+    before = signal.signal(signal.SIGALRM, break_off)
+    signal.setitimer(signal.ITIMER_REAL, seconds, seconds)  # again, if the call catches the first one
+    try:
+        return call()
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
 
 
 def stopping_at_once() -> AbstractContextManager[None]:

@@ -5,6 +5,7 @@ arm, table = on_table(write(folder / "arm.xml"), noise=0.1); arm.execute([], the
 
 import os
 import signal
+from functools import partial
 
 import mujoco
 import numpy as np
@@ -28,14 +29,14 @@ class Clock:
         self.now += seconds
 
 
-def write(path, lengths=(0.2, 0.2, 0.2), offsets=(0.0, 0.0, 0.0), names=("joint0", "joint1", "joint2")):
+def write(path, lengths=(0.2, 0.2, 0.2), offsets=(0.0, 0.0, 0.0), names=("joint0", "joint1", "joint2"), kp=60):
     """A model of a planar arm, whose joints have their zeros shifted by ``offsets`` (degrees)."""
     bodies, ends, x = "", "", 0
     for name, length, offset in zip(names, lengths, offsets, strict=True):
         bodies += f'<body pos="{x} 0 .1" euler="0 0 {offset}"><joint name="{name}" axis="0 0 1" range="-100 100"/>'
         bodies += f'<geom type="capsule" fromto="0 0 0 {length} 0 0" size=".02"/>'
         ends, x = ends + "</body>", length
-    servos = "".join(f'<position joint="{name}" kp="60" kv="6"/>' for name in names)
+    servos = "".join(f'<position joint="{name}" kp="{kp}" kv="{kp / 10}"/>' for name in names)
     path.write_text(
         '<mujoco><compiler autolimits="true"/><option timestep=".005" integrator="implicitfast" gravity="0 0 0"/>'
         '<default><joint damping="1"/><geom contype="0" conaffinity="0"/></default>'
@@ -56,6 +57,8 @@ class TableArm:
         lost: share of packets that are lost.
         answers: s that each answer takes.
         unit: degrees of one unit that it reads; negative if its motors turn the other way.
+        delay: s between a command and its effect.
+        frame: function (time, degrees) -> what it reads of them, if that is not what it takes.
 
     Attributes:
         events: functions to call at a time (s), once.
@@ -68,10 +71,11 @@ class TableArm:
         asked_off: time when torque was to be switched off last, whether motors heard it or not.
     """
 
-    def __init__(self, path, clock, *, noise=0.0, lost=0.0, answers=0.0, unit=1.0):
+    def __init__(self, path, clock, *, noise=0.0, lost=0.0, answers=0.0, unit=1.0, delay=0.0, frame=None):
         self.model = mujoco.MjModel.from_xml_path(str(path))
         self.data = mujoco.MjData(self.model)
         self.clock, self.noise, self.lost, self.answers, self.unit = clock, noise, lost, answers, unit
+        self.delay, self.frame = delay, frame
         self.rng = np.random.default_rng(0)
         self.joints = [self.model.joint(self.model.actuator_trnid[k, 0]).name for k in range(self.model.nu)]
         self.events, self.sent, self.temperature = {}, [], 30.0
@@ -96,15 +100,19 @@ class TableArm:
 
     def get_observation(self):
         self.talk()
-        read = self.degrees() / self.unit + self.noise * self.rng.standard_normal(self.model.nu)
+        told = self.frame(self.clock.now, self.degrees()) if self.frame else self.degrees()
+        read = told / self.unit + self.noise * self.rng.standard_normal(self.model.nu)
         return dict(zip(self.action_features, read.tolist(), strict=True))
 
     def send_action(self, action):
         self.talk()
         values = self.unit * np.array([action[name] for name in self.action_features])
         self.sent.append((self.clock.now, values, self.degrees()))
-        if self.torque:
-            self.data.ctrl[:] = np.radians(values)
+        if self.torque:  # the motors hear it when the delay is over
+            self.events[self.clock.now + self.delay] = partial(self.hear, np.radians(values))
+
+    def hear(self, command):
+        self.data.ctrl[:] = command
 
     def disable_torque(self):
         self.check_answer()

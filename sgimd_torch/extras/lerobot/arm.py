@@ -11,7 +11,6 @@ from __future__ import annotations
 import atexit
 import pkgutil
 import signal
-import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping
@@ -26,22 +25,21 @@ from numpy.typing import ArrayLike
 
 from sgimd_torch.calls import with_keywords_of
 from sgimd_torch.environments.protocol import SimulationError, check_movement, check_robot, reason_of, tried
+from sgimd_torch.extras.lerobot.watch import FIRST, Watch
 from sgimd_torch.extras.models.mujoco_robot import MujocoRobot
 from sgimd_torch.extras.recordings.units import in_rad, units_from, units_of
 from sgimd_torch.options.catalogue import load_reference
+from sgimd_torch.runs.signals import Stopping, returned
 from sgimd_torch.spaces import Array, Demonstration, Failure, check_point
 from sgimd_torch.texts import unknown_name_error
 
 PATIENCE: Final = 0.06  # s in which a call whose packet is lost is tried again
 PAUSE: Final = 0.01  # s between two tries
-BEGUN: Final = 0.2  # s after which all joints follow their commands
-AHEAD: Final = 0.05  # rad; a stalled joint is farther behind its command, which has gone on by as much
-HELD: Final = 0.05  # s in which a stalled joint has not moved
-MOVED: Final = 0.01  # rad, least way of a joint that moves
 LED: Final = 0.02  # rad, least way of an arm that is led
 COOLER: Final = 5.0  # degrees C below ``heat`` at which movements go on
 STILL: Final = 1.0  # s after which an arm that was led and does not move has been led to the end
-GENTLY: Final = 0.5  # share of ``speed`` on the way back to rest
+GENTLY: Final = 0.5  # share of ``speed`` on the way back to rest, and of first steps
+RESTED: Final = 0.5  # s after a first step when the joint is still
 KEPT: Final = 0.9  # least share of the commands of ``rate`` that are sent without a warning
 UNITS: Final = {"degrees": "deg", "range_0_100": "0:100", "range_m100_100": "-100:100"}  # by LeRobot's MotorNormMode
 OF_MODEL: Final = ("joints", "low", "high", "rest", "durations", "n_knots", "servos", "keyframe", "posture")
@@ -71,6 +69,9 @@ class LeRobotArm:
         rate: commands per second.
         speed: highest speed of a command (rad/s).
         step: largest distance (rad) between a command and the measured position.
+        tolerance: distance (rad) from the range of a joint at which it cannot be; a farther reading is a failure.
+        stall: distance (rad) behind its command, beyond its steady error, at which a joint that does not move stalls.
+        patience: time (s) that a movement may last beyond its plan, and that a call of the driver may take.
         heat: highest temperature (degrees C) of a motor; a hotter one cools down, without torque, before it moves on.
         clock: object with ``monotonic()`` and ``sleep(seconds)``, by default the module ``time``.
 
@@ -99,11 +100,15 @@ class LeRobotArm:
         rate: float = 50.0,
         speed: float = 3.0,
         step: float = 0.3,
+        tolerance: float = 0.15,
+        stall: float = 0.05,
+        patience: float = 5.0,
         heat: float = 60.0,
         clock: Any = time,
         **of_model: Any,
     ) -> None:
-        for name, value in (("rate", rate), ("speed", speed), ("step", step), ("heat", heat)):
+        limits = {"rate": rate, "speed": speed, "step": step, "heat": heat}
+        for name, value in {**limits, "tolerance": tolerance, "stall": stall, "patience": patience}.items():
             if not 0 < value < np.inf:
                 raise ValueError(f"{name} must be finite and above 0, got {value}")
         for name, text, example in (("robot", robot, "so101_follower"), ("units", units, "deg,gripper=0:100")):
@@ -139,7 +144,8 @@ class LeRobotArm:
         sides = zip(self.joints, ranges.low.tolist(), ranges.high.tolist(), strict=True)
         self._scales, self._shifts = np.array([in_rad(name, unit_of[name], (low, high)) for name, low, high in sides]).T
         self.settle, self.rate, self.speed, self.step, self.heat = settle, rate, speed, step, heat
-        self._clock, self._is_slow, self._signal = clock, False, 0
+        self._clock, self._is_slow, self.patience, self._ranges = clock, False, patience, ranges
+        self._watch = Watch(self.joints, ranges, tolerance, stall, speed, step)
         self._command: Array | None = None  # the last one (rad); None: not connected
         check_robot(self)
 
@@ -151,17 +157,20 @@ class LeRobotArm:
         """``(outcome_dim,)``, the outcome of one movement, after which the arm goes back to rest; see `Environment`.
 
         Raises:
-            SimulationError: a joint stalls, a motor is hot, a signal came, or the outcome was not seen.
+            SimulationError: a joint stalls or reads what cannot be, the movement takes too long, a motor is hot, a
+                signal came, or the outcome was not seen.
             OSError: the arm does not answer.
         """
         _, theta = check_movement(self, context, theta)
         with self._torque_off_after_an_error():
             if self._command is None:
                 self._connect()
-                self._follow(self._twin.start[None], GENTLY * self.speed)
-            self._follow(self._twin.commanded(theta), self.speed)
+                if np.isinf(self._watch.delays).any():
+                    self._try_joints()
+                self._follow(self._twin.start[None], GENTLY * self.speed, self.settle)
+            self._follow(self._twin.commanded(theta), self.speed, self.settle)
             outcome = tried("outcome", self.outcomes.dim, self._outcome)
-            self._follow(self._twin.start[None], GENTLY * self.speed)
+            self._follow(self._twin.start[None], GENTLY * self.speed, self.settle)
         if isinstance(outcome, Failure):
             raise SimulationError(f"the outcome was not seen: {outcome.reason}")
         return outcome
@@ -198,10 +207,11 @@ class LeRobotArm:
         """Switch torque off and disconnect; the next movement connects again."""
         atexit.unregister(self.release)
         self._command = None
+        self._watch.forget()
         for bus in self._buses:
-            _error_of(bus, "sync_write", "Torque_Enable", 0)  # reaches motors that cannot answer, too
-        errors = [error for bus in self._buses if (error := _error_of(bus, "disable_torque"))]
-        left = _error_of(self.robot, "disconnect")
+            self._error_of(bus, "sync_write", "Torque_Enable", 0)  # reaches motors that cannot answer, too
+        errors = [error for bus in self._buses if (error := self._error_of(bus, "disable_torque"))]
+        left = self._error_of(self.robot, "disconnect")
         if errors or left:  # this driver may believe for good that it is connected
             self.robot, self._buses = self._made()
         if left and (errors or not self._buses):
@@ -216,29 +226,21 @@ class LeRobotArm:
     @contextmanager
     def _torque_off_after_an_error(self) -> Iterator[None]:
         """A block of movements; after an error torque is off. A signal is handled when it is off."""
-        self._signal = 0
-
-        def note(signum: int, frame: object) -> None:
-            if self._signal:  # the arm hangs
-                raise KeyboardInterrupt
-            self._signal = signum
-
-        heard = (signal.SIGINT, signal.SIGTERM) if threading.current_thread() is threading.main_thread() else ()
-        before = [(signum, signal.signal(signum, note)) for signum in heard]
+        self._stopping = Stopping("stopping; if the driver does not return, Ctrl-C once more switches torque off")
         try:
-            yield
-        except BaseException:
-            self.release()
-            raise
+            with self._stopping:
+                try:
+                    yield
+                except BaseException:
+                    self.release()
+                    raise
         finally:
-            for signum, handler in before:
-                signal.signal(signum, handler)
-            if self._signal:
-                signal.raise_signal(self._signal)
+            if self._stopping.heard:
+                signal.raise_signal(self._stopping.heard)
 
     def _check_signal(self) -> None:
-        if self._signal:
-            raise SimulationError(f"stopped by {signal.Signals(self._signal).name} in mid-movement; torque is off")
+        if heard := self._stopping.heard:
+            raise SimulationError(f"stopped by {signal.Signals(heard).name} in mid-movement; torque is off")
 
     def _connect(self) -> None:
         atexit.register(self.release)
@@ -246,32 +248,43 @@ class LeRobotArm:
             self.robot.connect()
         observation, names = self._answer(self.robot.get_observation), self.robot.action_features
         self._held = {name: 0.0 if name.endswith(".vel") else observation[name] for name in names}
-        self._command = self._measured(observation)
+        self._command = self._ranges.clip(self._measured(observation))
 
-    def _follow(self, commands: Array, speed: float) -> None:
+    def _try_joints(self) -> None:
+        """Before the first movement, ask each joint for a small step there and back, and see that it follows."""
+        assert self._command is not None
+        for k, here in enumerate(self._command.tolist()):
+            there, back = self._command.copy(), self._command
+            low, high = self._ranges.low[k], self._ranges.high[k]
+            there[k] += np.copysign(min(FIRST, (high - low) / 2), (low + high) / 2 - here)
+            self._follow(there[None], GENTLY * self.speed, RESTED)
+            self._watch.learn(k)
+            self._follow(back[None], GENTLY * self.speed, RESTED)
+
+    def _follow(self, commands: Array, speed: float, settle: float) -> None:
         """Play commands ``(n_steps, n_joints)`` (rad), one for each timestep of the model; settle at the last."""
         assert self._command is not None
         timestep, clock, ticks = self._twin.model.opt.timestep, self._clock, 0
         moving = np.flatnonzero((commands != commands[-1]).any(axis=1)).max(initial=-1)
         begun = then = due = away_at = clock.monotonic()
-        free_at, free_posture, pushed, push = (np.zeros(len(self.joints)) for _ in range(4))
-        wanted = self._command
+        self._watch.begin(begun, self._command)
+        whole = np.abs(np.diff(commands, axis=0, prepend=self._command[None])).sum(axis=0).max()
+        longest = len(commands) * timestep + whole / speed + settle + self.patience
         while True:
             self._check_signal()
             now, measured = clock.monotonic(), self._measured(self._answer(self.robot.get_observation))
+            self._watch.see(now, measured)
             row = min(int((now - begun) / timestep), len(commands) - 1)
-            # A joint can have followed the command before this one, at best.
-            free = (np.abs(wanted - measured) <= min(AHEAD, self.step)) | (np.abs(measured - free_posture) > MOVED)
-            free |= now - begun < BEGUN
-            free_at[free], free_posture[free] = now, measured[free]
-            pushed = np.where(free, 0.0, pushed + push)
-            for k in np.flatnonzero((pushed > AHEAD) & (now - free_at > HELD)):
-                told = f"{self.joints[k]} stalls at {measured[k]:.3g} rad on its way to {commands[row, k]:.3g}"
-                raise SimulationError(f"{told}; torque is off")
+            if now - begun > longest:
+                k = int(np.abs(measured - commands[row]).argmax())
+                told = f"the movement has not ended after {longest:.1f} s; {self.joints[k]} is at {measured[k]:.3g} rad"
+                raise SimulationError(f"{told} on its way to {commands[row, k]:.3g}; torque is off")
             way = speed * (now - then if ticks else 1 / self.rate)
             wanted = self._command + np.clip(commands[row] - self._command, -way, way)
-            push = np.abs(wanted - self._command)
-            self._command = np.clip(wanted, measured - self.step, measured + self.step)
+            self._watch.command(now, wanted, np.abs(wanted - self._command))
+            near = np.clip(wanted, measured - self.step, measured + self.step)
+            # It may wait for the arm, but never goes back with it.
+            self._command = np.clip(near, np.minimum(self._command, wanted), np.maximum(self._command, wanted))
             values = ((self._command - self._shifts) / self._scales).tolist()
             action = {**self._held, **dict(zip(self._motors, values, strict=True))}
             self._answer(partial(self.robot.send_action, action))
@@ -280,8 +293,9 @@ class LeRobotArm:
                 away_at = now
             due = max(due + 1 / self.rate, clock.monotonic())
             clock.sleep(max(0.0, due - clock.monotonic()))  # time passes between two looks at a clock
-            if now - away_at >= self.settle:
+            if now - away_at >= settle:
                 break
+        self._watch.settled(self._command - measured)
         self._cool_down()
         sent = (ticks - 1) / max(now - begun, 1e-9)
         if ticks > 1 and sent < KEPT * self.rate and not self._is_slow:
@@ -319,27 +333,26 @@ class LeRobotArm:
     def _measured(self, observation: Mapping[str, Any]) -> Array:
         """``(n_joints,)`` rad."""
         values = [float(observation[motor]) for motor in self._motors]
-        return check_point("joints", self._scales * values + self._shifts, len(self.joints))
+        return self._watch.check(check_point("joints", self._scales * values + self._shifts, len(self.joints)))
 
     def _answer(self, call: Callable[[], Any]) -> Any:
         """The result of a call of the robot, which is tried again if a packet is lost."""
         begun = self._clock.monotonic()
         while True:
             try:
-                return call()
+                return returned(call, self.patience)
             except OSError:
                 if self._clock.monotonic() - begun > PATIENCE:
                     raise
             self._clock.sleep(PAUSE)
 
-
-def _error_of(part: Any, name: str, *given: Any) -> BaseException | None:
-    """What a method of a part of the arm raises; also after Ctrl-C the other switches are still to be tried."""
-    try:
-        getattr(part, name)(*given)
-    except BaseException as error:
-        return error
-    return None
+    def _error_of(self, part: Any, name: str, *given: Any) -> BaseException | None:
+        """What a method of a part of the arm raises; also after Ctrl-C the other switches are still to be tried."""
+        try:
+            returned(lambda: getattr(part, name)(*given), self.patience)
+        except BaseException as error:
+            return error
+        return None
 
 
 def _reads(buses: list[Any], motor: str) -> str:

@@ -1,0 +1,107 @@
+"""An arm that reads what it is not commanded in, or late, is stopped and cannot run away; a good one is not stopped."""
+
+import re
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from arms import interrupt, on_table, write
+from sgimd_torch import SimulationError, stream
+from sgimd_torch.runs.signals import Overdue
+
+NONE, RNG = np.zeros(0), stream(0, "arm")
+MOVEMENTS = [stream(k, "bad arm").random(13) for k in range(4)]
+
+
+def joint1(read):
+    """A frame in which ``joint1`` reads ``read(time, degrees)``."""
+    return lambda time, degrees: np.array([degrees[0], read(time, degrees[1]), degrees[2]])
+
+
+FRAMES = {  # what joint1, or all joints, read
+    "90 degrees off": joint1(lambda time, x: x + 90),
+    "-90 degrees off": joint1(lambda time, x: x - 90),
+    "20 degrees off": joint1(lambda time, x: x + 20),
+    "raw ticks": joint1(lambda time, x: 2048 + x * 4096 / 360),
+    "radians": joint1(lambda time, x: np.radians(x)),
+    "wrong sign": joint1(lambda time, x: -x),
+    "wraps in a first step": joint1(lambda time, x: x + 360 * (time > 1.5)),
+    "wraps in a movement": joint1(lambda time, x: x - 360 * (time > 7)),
+    "jumps within its range": joint1(lambda time, x: x + np.copysign(60, -x) * (time > 7)),
+    "wrong sign later": joint1(lambda time, x: x if time < 7 else -x),
+    "stands still": joint1(lambda time, x: 12.0),
+    "drifts": joint1(lambda time, x: x + 20 * max(0.0, time - 7)),
+    "is another joint": lambda time, degrees: degrees[[0, 2, 1]],
+}
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.05, 0.1])
+@pytest.mark.parametrize("frame", FRAMES)
+def test_no_command_leaves_the_range_and_no_movement_is_endless_in_another_frame(tmp_path, frame, delay):
+    for begin in (0, 50):
+        of_arm = {"delay": delay, "noise": 0.2, "frame": FRAMES[frame]}
+        arm, on = on_table(write(tmp_path / "arm.xml"), of_arm=of_arm)
+        on.data.qpos[:3], failed = np.radians(begin), []
+        for theta in MOVEMENTS:
+            began = on.clock.now
+            try:
+                arm.execute(NONE, theta, RNG)
+            except SimulationError as error:
+                failed.append(str(error))
+                assert not on.torque
+            assert on.clock.now - began < 20
+        assert failed
+        assert all(re.match("(joint1|the movement has not ended .*joint1)", told) for told in failed)
+        assert all(np.abs(command).max() < 100 + 1e-9 for _, command, _ in on.sent)
+
+
+SOFT = {  # servos and links as those of an SO-101, with their weight
+    'damping="1"': 'damping=".6" armature=".028" frictionloss=".052"',
+    'gravity="0 0 0"': 'gravity="0 -9.81 0"',
+    'size=".02"': 'size=".02" mass=".1"',
+}
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.05, 0.1])
+@pytest.mark.parametrize("kp", [17.8, 100])
+def test_a_soft_and_late_arm_does_not_stall_where_nothing_is_in_its_way(tmp_path, kp, delay):
+    built = write(tmp_path / "built.xml", offsets=(3, -3, 2), kp=kp)
+    text = re.sub(' kv=".*?"', "", built.read_text())
+    for old, new in SOFT.items():
+        text = text.replace(old, new)
+    built.write_text(text)
+    arm, on = on_table(write(tmp_path / "arm.xml"), built, of_arm={"delay": delay, "noise": 0.2})
+    on.data.qpos[:3] = 1.0
+    for k in range(25):
+        arm.execute(NONE, arm.policies.sample(stream(k, "soft")), RNG)
+    assert on.torque
+
+
+def hang():
+    time.sleep(60)
+
+
+def test_a_driver_that_hangs_is_broken_off_after_its_patience_and_torque_is_switched_off(tmp_path, capfd):
+    arm, on = on_table(write(tmp_path / "arm.xml"), patience=0.3)
+    arm.execute(NONE, MOVEMENTS[0], RNG)
+    on.events[on.clock.now + 0.3] = hang
+    with pytest.raises(Overdue, match=r"the driver has not returned for 0\.3 s"):
+        arm.execute(NONE, MOVEMENTS[0], RNG)
+    assert not on.torque
+    assert "the driver has not returned" in capfd.readouterr().err
+    arm.execute(NONE, MOVEMENTS[0], RNG)
+
+
+def test_the_first_ctrl_c_says_what_helps_if_the_driver_hangs_and_the_second_one_switches_torque_off(tmp_path, capfd):
+    arm, on = on_table(write(tmp_path / "arm.xml"), patience=30.0)
+    arm.execute(NONE, MOVEMENTS[0], RNG)
+    on.events[on.clock.now + 0.3] = hang
+    keys = [threading.Timer(seconds, interrupt) for seconds in (0.3, 0.6)]
+    for key in keys:
+        key.start()
+    with pytest.raises(KeyboardInterrupt):
+        arm.execute(NONE, MOVEMENTS[0], RNG)
+    assert not on.torque
+    assert capfd.readouterr().err.count("if the driver does not return, Ctrl-C once more switches torque off") == 1
