@@ -30,10 +30,12 @@ from sgimd_torch.environments.motor_primitives import GaussianPrimitive
 from sgimd_torch.environments.protocol import execute_many, primitive_of
 from sgimd_torch.evaluation import beyond
 from sgimd_torch.files import check_writable, read_csv, write_text
+from sgimd_torch.memory.compiled import compile_all
 from sgimd_torch.runs.load import OpenRun
 from sgimd_torch.runs.messages import say
 from sgimd_torch.runs.program import Failed, parser_of
 from sgimd_torch.runs.run_parts import RunParts
+from sgimd_torch.runs.signals import Stopped, Stopping
 from sgimd_torch.spaces import Array, Box, Failure, stream
 from sgimd_torch.texts import NUMBER
 
@@ -52,19 +54,23 @@ def main(argv: Sequence[str] | None = None) -> int:
         OSError: a file cannot be read or written.
     """
     options = parser().parse_args(argv)
-    run = OpenRun(options.run, trust=options.trust)
     for path in filter(None, (options.out, options.trajectory)):
         check_writable(path)
-    parts = run.parts
-    goals = [*options.goal, *(_read(options.goals, parts.environment.outcomes) if options.goals else [])]
-    if not goals or (options.trajectory and len(goals) > 1):
-        raise ValueError("give --goal X,Y or --goals FILE; --trajectory takes one goal")
-    run.recall()
-    answers = list(_answers(parts, goals, options.context))
-    asked = np.stack([answer["goal"] for answer in answers])
-    for goal in asked[beyond(parts.learner.memory.outcomes, asked)]:
-        say(f"goal {_text(goal)} looks out of reach: all outcomes near it lie on one side of it")
-    failed = list(_execute(parts, answers)) if options.execute else []
+    with Stopping("stopping before the next movement; Ctrl-C once more stops at once") as stopping:
+        if options.execute:  # before there is a robot; numba may lose the exception of a signal
+            compile_all()
+            _stop_if(stopping)
+        run = OpenRun(options.run, trust=options.trust)
+        parts = run.parts
+        goals = [*options.goal, *(_read(options.goals, parts.environment.outcomes) if options.goals else [])]
+        if not goals or (options.trajectory and len(goals) > 1):
+            raise ValueError("give --goal X,Y or --goals FILE; --trajectory takes one goal")
+        run.recall()
+        answers = list(_answers(parts, goals, options.context))
+        asked = np.stack([answer["goal"] for answer in answers])
+        for goal in asked[beyond(parts.learner.memory.outcomes, asked)]:
+            say(f"goal {_text(goal)} looks out of reach: all outcomes near it lie on one side of it")
+        failed = list(_execute(parts, answers, stopping)) if options.execute else []
     if options.trajectory:
         _write_trajectory(options.trajectory, parts, answers[0]["theta"])
     if options.out is None:
@@ -118,10 +124,16 @@ def _answers(parts: RunParts, goals: Sequence[Sequence[float]], given: Sequence[
         yield answer
 
 
-def _execute(parts: RunParts, answers: Sequence[Answer]) -> Iterator[str]:
+def _stop_if(stopping: Stopping) -> None:
+    if stopping.heard:
+        raise Stopped(stopping.heard)
+
+
+def _execute(parts: RunParts, answers: Sequence[Answer], stopping: Stopping) -> Iterator[str]:
     """Add to each answer what the robot reaches with it; yields a reason for each movement that fails."""
     robot = parts.environment
     for k, answer in enumerate(answers):
+        _stop_if(stopping)
         rng = stream(parts.config.seed, "ask", k)
         (reached,) = execute_many(robot, [answer["context"]], [answer["theta"]], [rng])
         if isinstance(reached, Failure):

@@ -3,7 +3,9 @@
 import csv
 import math
 import re
+import signal
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -125,3 +127,13 @@ def test_a_distance_is_told_with_its_unit(path, capsys):
     said = capsys.readouterr().out
     away = re.search(r"; expected_distance (\S+) m; expected_deviation \S+ m\n", said)
     assert float(away[1]) == pytest.approx(math.sqrt(2) - 1, abs=0.05)
+
+
+def test_a_signal_that_numba_loses_while_it_compiles_stops_before_the_robot_moves(path, monkeypatch, capsys):
+    def compile_and_lose_a_signal():
+        with suppress(BaseException):
+            signal.raise_signal(signal.SIGTERM)
+
+    monkeypatch.setattr("sgimd_torch.extras.ask.command.compile_all", compile_and_lose_a_signal)
+    assert command(main, [str(path), "--goal", "0.3,0.4", "--execute"]) == 143
+    assert capsys.readouterr().out == ""
