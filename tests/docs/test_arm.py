@@ -9,8 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from arms import on_table, write
+from arms import Clock, on_table, write
+from sgimd_torch import stream
 from sgimd_torch.__main__ import _call
+from sgimd_torch.extras.lerobot.arm import LeRobotArm
 from sgimd_torch.runs.program import command
 
 SO101 = ("shoulder_pan", "shoulder_lift", "elbow_flex")
@@ -50,6 +52,20 @@ def test_the_camera_sees_a_puck_in_a_stream_of_pictures_to_two_millimetres():
         assert camera["puck"]({"above": picture(cv2, camera, puck, rng)}) == pytest.approx(puck, abs=0.002)
     with pytest.raises(LookupError, match=r"the markers \[0, 1, 2, 3, 4\] are not seen"):
         camera["puck"]({"above": np.zeros((480, 640), np.uint8)})
+
+
+def test_the_driver_of_the_page_moves_an_arm_by_its_six_calls(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "docs/how-to")
+    model = write(tmp_path / "arm.xml", names=("shoulder", "elbow", "wrist"))
+    options = {"outcome": "site:tip:xy", "units": "rad", "low": (-0.7, -0.7), "high": (0.7, 0.7), "durations": (1, 2)}
+    arm = LeRobotArm("driver:make", model=str(model), clock=Clock(), **options)
+    theta = np.append(np.repeat([0.9, 0.5, 0.5], 4), 0.0)
+    angle = np.radians(80)
+    outcome = arm.execute(np.zeros(0), theta, stream(0, "driver"))
+    assert outcome == pytest.approx([0.6 * np.cos(angle), 0.6 * np.sin(angle)], abs=1e-6)
+    assert arm.robot.is_connected
+    arm.release()
+    assert not arm.robot.is_connected
 
 
 @pytest.mark.slow
