@@ -24,6 +24,7 @@ import numpy as np
 from sgimd_torch.environments.protocol import (
     FAILURES,
     Environment,
+    NotExecutedError,
     check_instance,
     execute_many,
     observed,
@@ -147,7 +148,8 @@ def run(
                 seen = np.full(environment.contexts.dim, np.nan) if isinstance(context, Failure) else context
                 preceding = before.pop(robot)
                 if isinstance(outcome, Failure):
-                    failed_in_a_row.append(outcome)
+                    if not isinstance(outcome.cause, NotExecutedError):
+                        failed_in_a_row.append(outcome)
                     yield Episode(first + robot, seen, move, None, *preceding, outcome.reason)
                 else:
                     if move is not None and len(failed_in_a_row) < failures:

@@ -166,6 +166,10 @@ class SimulationError(RuntimeError):
         return self.reason if self.theta is None else f"{self.reason}; theta={np.asarray(self.theta).tolist()}"
 
 
+class NotExecutedError(SimulationError):
+    """A movement was not executed, as it would do harm; the robot is well. It does not count towards ``FAILURES``."""
+
+
 def beside_execute(environment: object, name: str) -> bool:
     """Whether the method ``name`` counts: it is defined beside ``execute`` or below it, so it is of the same robot.
 

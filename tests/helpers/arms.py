@@ -4,6 +4,7 @@ arm, table = on_table(write(folder / "arm.xml"), noise=0.1); arm.execute([], the
 """
 
 import os
+import re
 import signal
 from functools import partial
 
@@ -47,6 +48,14 @@ def write(path, lengths=(0.2, 0.2, 0.2), offsets=(0.0, 0.0, 0.0), names=("joint0
     return path
 
 
+def upright(path):
+    """The model at ``path`` as an arm that moves up and down, 30 mm above a table."""
+    text = path.read_text().replace('axis="0 0 1"', 'axis="0 1 0"').replace('contype="0" conaffinity="0"', "")
+    table = '<worldbody><geom name="table" type="box" size="1 1 .01" pos="0 0 .04"/>'
+    path.write_text(re.sub('<body name="puck".*?</body>', "", text).replace("<worldbody>", table))
+    return path
+
+
 class TableArm:
     """A MuJoCo arm that reads degrees.
 
@@ -68,6 +77,7 @@ class TableArm:
         unplugged: whether nothing answers.
         overloaded: whether the first motor answers with an error, after which no other motor is asked.
         jammed: whether the first joint is stuck.
+        touches: number of steps in which anything touched.
         asked_off: time when torque was to be switched off last, whether motors heard it or not.
     """
 
@@ -80,7 +90,7 @@ class TableArm:
         self.joints = [self.model.joint(self.model.actuator_trnid[k, 0]).name for k in range(self.model.nu)]
         self.events, self.sent, self.temperature = {}, [], 30.0
         self.is_connected = self.torque = self.unplugged = self.overloaded = self.jammed = False
-        self.switched_off, self.asked_off, self.hand = None, None, None
+        self.switched_off, self.asked_off, self.hand, self.touches = None, None, None, 0
 
     @property
     def action_features(self):
@@ -158,6 +168,7 @@ class TableArm:
             before = self.data.qpos[0]
             if self.torque:
                 mujoco.mj_step(self.model, self.data)
+                self.touches += self.data.ncon > 0
             else:
                 self.data.time += self.model.opt.timestep
                 self.data.qvel[:] = 0

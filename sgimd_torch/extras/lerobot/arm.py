@@ -24,10 +24,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sgimd_torch.calls import with_keywords_of
-from sgimd_torch.environments.protocol import SimulationError, check_movement, check_robot, reason_of, tried
+from sgimd_torch.environments.protocol import (
+    NotExecutedError,
+    SimulationError,
+    check_movement,
+    check_robot,
+    reason_of,
+    tried,
+)
 from sgimd_torch.extras.lerobot.watch import FIRST, Watch
 from sgimd_torch.extras.models.mujoco_robot import MujocoRobot
-from sgimd_torch.extras.recordings.units import in_rad, units_from, units_of
+from sgimd_torch.extras.models.untouched import Untouched, touched_by
+from sgimd_torch.extras.recordings.led import led
+from sgimd_torch.extras.recordings.units import motor_unit, scales_of
 from sgimd_torch.options.catalogue import load_reference
 from sgimd_torch.runs.signals import Stopping, returned
 from sgimd_torch.spaces import Array, Demonstration, Failure, check_point
@@ -35,13 +44,10 @@ from sgimd_torch.texts import unknown_name_error
 
 PATIENCE: Final = 0.06  # s in which a call whose packet is lost is tried again
 PAUSE: Final = 0.01  # s between two tries
-LED: Final = 0.02  # rad, least way of an arm that is led
 COOLER: Final = 5.0  # degrees C below ``heat`` at which movements go on
-STILL: Final = 1.0  # s after which an arm that was led and does not move has been led to the end
 GENTLY: Final = 0.5  # share of ``speed`` on the way back to rest, and of first steps
 RESTED: Final = 0.5  # s after a first step when the joint is still
 KEPT: Final = 0.9  # least share of the commands of ``rate`` that are sent without a warning
-UNITS: Final = {"degrees": "deg", "range_0_100": "0:100", "range_m100_100": "-100:100"}  # by LeRobot's MotorNormMode
 OF_MODEL: Final = ("joints", "low", "high", "rest", "durations", "n_knots", "servos", "keyframe", "posture")
 
 
@@ -71,6 +77,7 @@ class LeRobotArm:
         step: largest distance (rad) between a command and the measured position.
         tolerance: distance (rad) from the range of a joint at which it cannot be; a farther reading is a failure.
         stall: distance (rad) behind its command, beyond its steady error, at which a joint that does not move stalls.
+        clearance: distance (m) from what stands still in the model within which no simulated way may come.
         patience: time (s) that a movement may last beyond its plan, and that a call of the driver may take.
         heat: highest temperature (degrees C) of a motor; a hotter one cools down, without torque, before it moves on.
         clock: object with ``monotonic()`` and ``sleep(seconds)``, by default the module ``time``.
@@ -103,6 +110,7 @@ class LeRobotArm:
         tolerance: float = 0.15,
         stall: float = 0.05,
         patience: float = 5.0,
+        clearance: float = 0.02,
         heat: float = 60.0,
         clock: Any = time,
         **of_model: Any,
@@ -118,12 +126,16 @@ class LeRobotArm:
         self._see = load_reference("seen_by", seen_by) if seen_by else None
         self.robot, self._buses = self._made()
         self._twin = twin = MujocoRobot(model, outcome=outcome, outcome_noise=outcome_noise, settle=settle, **of_model)
-        self.contexts, self.policies, self.outcomes, self.rest = twin.contexts, twin.policies, twin.outcomes, twin.rest
-        self.outcome_noise, self.joints, self.primitive = outcome_noise, twin.joints, twin.primitive
-        self.within_reach = twin.within_reach
+        self.contexts, self.outcomes, self.rest, self.primitive = (
+            twin.contexts,
+            twin.outcomes,
+            twin.rest,
+            twin.primitive,
+        )
+        self.outcome_noise, self.joints, self.within_reach = outcome_noise, twin.joints, twin.within_reach
         self.correspondence, self.files, self.remarks = twin.correspondence, twin.files, twin.remarks
         self.found_options = {name: twin.found_options[name] for name in self.FOUND_OPTIONS}
-        ranges, unit_of = twin.primitive.ranges, units_of(self.joints, units_from(units))
+        self.primitive, ranges = twin.primitive, twin.primitive.ranges
         if not self.joints or ranges is None:
             raise ValueError(f"the actuators of {model} do not take positions of joints, as the motors of an arm do")
         if not seen_by and not twin.carries_outcome:
@@ -135,16 +147,12 @@ class LeRobotArm:
                 raise unknown_name_error("motor", name, known, "; motors names one for each joint, in their order")
         if len(self._motors) != len(self.joints):
             raise ValueError(f"motors must name one for each of {', '.join(self.joints)}, got {', '.join(motors)}")
-        if lacking := [joint for joint in self.joints if joint not in unit_of]:
-            raise ValueError(f"units has none for {', '.join(lacking)}; deg,gripper=0:100 is deg for all but gripper")
-        for joint, motor in zip(self.joints, self._motors, strict=True):
-            reads = _reads(self._buses, motor.removesuffix(".pos"))
-            if unit_of[joint] in ("deg", "rad") and reads not in ("", unit_of[joint]):
-                raise ValueError(f"{motor} reads {reads}, not {unit_of[joint]}: units {joint}={reads}")
-        sides = zip(self.joints, ranges.low.tolist(), ranges.high.tolist(), strict=True)
-        self._scales, self._shifts = np.array([in_rad(name, unit_of[name], (low, high)) for name, low, high in sides]).T
+        reads = {motor: motor_unit(self._buses, motor.removesuffix(".pos")) for motor in self._motors}
+        self._scales, self._shifts = scales_of(self.joints, units, ranges, reads)
         self.settle, self.rate, self.speed, self.step, self.heat = settle, rate, speed, step, heat
         self._clock, self._is_slow, self.patience, self._ranges = clock, False, patience, ranges
+        self._touches = partial(touched_by, twin, speed, GENTLY * speed, clearance)
+        self.policies = Untouched(twin.policies.low, twin.policies.high, touches=self._touches)
         self._watch = Watch(self.joints, ranges, tolerance, stall, speed, step)
         self._command: Array | None = None  # the last one (rad); None: not connected
         check_robot(self)
@@ -157,11 +165,14 @@ class LeRobotArm:
         """``(outcome_dim,)``, the outcome of one movement, after which the arm goes back to rest; see `Environment`.
 
         Raises:
+            NotExecutedError: the simulated way touches something; the arm has not moved, and its torque stays on.
             SimulationError: a joint stalls or reads what cannot be, the movement takes too long, a motor is hot, a
                 signal came, or the outcome was not seen.
             OSError: the arm does not answer.
         """
         _, theta = check_movement(self, context, theta)
+        if touched := self._touches(theta):
+            raise NotExecutedError(f"not executed: {touched} would touch, or nearly")
         with self._torque_off_after_an_error():
             if self._command is None:
                 self._connect()
@@ -184,30 +195,19 @@ class LeRobotArm:
         """
         if not self._buses:
             raise ValueError("the robot has no bus with disable_torque(); record with its own program instead")
-        times, postures, moves, before = list[float](), list[Array](), list[int](), np.full(len(self.joints), np.inf)
         with self._torque_off_after_an_error():
             self._connect()
             for bus in self._buses:
                 bus.disable_torque()
-            begun = self._clock.monotonic()
-            while len(moves) < 2 or times[-1] - times[moves[-1]] < STILL:
-                self._check_signal()
-                times.append(self._clock.monotonic() - begun)
-                postures.append(self._measured(self._answer(self.robot.get_observation)))
-                if np.abs(postures[-1] - before).max() > LED:  # the first one, too
-                    moves.append(len(times) - 1)
-                    before = postures[-1]
-                self._clock.sleep(max(0.0, begun + len(times) / self.rate - self._clock.monotonic()))
+            times, postures = led(self._look, self._clock, self.rate)
             outcome = self._outcome()
         self.release()
-        led = slice(moves[1] - 1, moves[-1] + 1)
-        return Demonstration(np.zeros(0), np.subtract(times[led], times[led.start]), np.array(postures[led]), outcome)
+        return Demonstration(np.zeros(0), times, postures, outcome)
 
     def release(self) -> None:
         """Switch torque off and disconnect; the next movement connects again."""
         atexit.unregister(self.release)
-        self._command = None
-        self._watch.forget()
+        self._command = self._watch.last = None
         for bus in self._buses:
             self._error_of(bus, "sync_write", "Torque_Enable", 0)  # reaches motors that cannot answer, too
         errors = [error for bus in self._buses if (error := self._error_of(bus, "disable_torque"))]
@@ -215,11 +215,9 @@ class LeRobotArm:
         if errors or left:  # this driver may believe for good that it is connected
             self.robot, self._buses = self._made()
         if left and (errors or not self._buses):
-            told = f"torque may still be on, switch off the power: {reason_of(left)}"
-            warnings.warn(told, RuntimeWarning, stacklevel=2)
+            warnings.warn(f"torque may be on, switch off the power: {reason_of(left)}", RuntimeWarning, stacklevel=2)
 
     def _made(self) -> tuple[Any, list[Any]]:
-        """A robot, and its buses or those of its arms."""
         robot = self._make()
         return robot, [part.bus for part in (robot, *vars(robot).values()) if hasattr(part, "bus")]
 
@@ -253,10 +251,10 @@ class LeRobotArm:
     def _try_joints(self) -> None:
         """Before the first movement, ask each joint for a small step there and back, and see that it follows."""
         assert self._command is not None
-        for k, here in enumerate(self._command.tolist()):
-            there, back = self._command.copy(), self._command
-            low, high = self._ranges.low[k], self._ranges.high[k]
-            there[k] += np.copysign(min(FIRST, (high - low) / 2), (low + high) / 2 - here)
+        back, middle = self._command, (self._ranges.low + self._ranges.high) / 2
+        for k, step in enumerate(np.diag(np.minimum(FIRST, self._ranges.sides / 2) * np.where(back > middle, -1, 1))):
+            steps = [joints for joints in (back + step, back - step) if self._ranges.contains(joints)]
+            there = min(steps, key=self._twin.posture_touches)
             self._follow(there[None], GENTLY * self.speed, RESTED)
             self._watch.learn(k)
             self._follow(back[None], GENTLY * self.speed, RESTED)
@@ -271,13 +269,12 @@ class LeRobotArm:
         whole = np.abs(np.diff(commands, axis=0, prepend=self._command[None])).sum(axis=0).max()
         longest = len(commands) * timestep + whole / speed + settle + self.patience
         while True:
-            self._check_signal()
-            now, measured = clock.monotonic(), self._measured(self._answer(self.robot.get_observation))
+            now, measured = clock.monotonic(), self._look()
             self._watch.see(now, measured)
             row = min(int((now - begun) / timestep), len(commands) - 1)
             if now - begun > longest:
                 k = int(np.abs(measured - commands[row]).argmax())
-                told = f"the movement has not ended after {longest:.1f} s; {self.joints[k]} is at {measured[k]:.3g} rad"
+                told = f"the movement has not ended after {longest:.1f} s: {self.joints[k]} reads {measured[k]:.3g} rad"
                 raise SimulationError(f"{told} on its way to {commands[row, k]:.3g}; torque is off")
             way = speed * (now - then if ticks else 1 / self.rate)
             wanted = self._command + np.clip(commands[row] - self._command, -way, way)
@@ -295,7 +292,7 @@ class LeRobotArm:
             clock.sleep(max(0.0, due - clock.monotonic()))  # time passes between two looks at a clock
             if now - away_at >= settle:
                 break
-        self._watch.settled(self._command - measured)
+        self._watch.errors = np.maximum(self._watch.errors, np.abs(self._command - measured))
         self._cool_down()
         sent = (ticks - 1) / max(now - begun, 1e-9)
         if ticks > 1 and sent < KEPT * self.rate and not self._is_slow:
@@ -330,6 +327,11 @@ class LeRobotArm:
         observation = self._answer(self.robot.get_observation)
         return self._twin.outcome_at(self._measured(observation)) if self._see is None else self._see(observation)
 
+    def _look(self) -> Array:
+        """``(n_joints,)`` rad, unless a signal has come."""
+        self._check_signal()
+        return self._measured(self._answer(self.robot.get_observation))
+
     def _measured(self, observation: Mapping[str, Any]) -> Array:
         """``(n_joints,)`` rad."""
         values = [float(observation[motor]) for motor in self._motors]
@@ -353,13 +355,6 @@ class LeRobotArm:
         except BaseException as error:
             return error
         return None
-
-
-def _reads(buses: list[Any], motor: str) -> str:
-    """The unit that this motor of a bus of LeRobot reads, "" if it is unknown."""
-    tables = [bus.motors for bus in buses if isinstance(getattr(bus, "motors", None), Mapping)]
-    modes = [table[motor].norm_mode for table in tables if hasattr(table.get(motor), "norm_mode")]
-    return UNITS.get(modes[0].value, "") if modes else ""
 
 
 def _of_lerobot(name: str, port: str, robot_id: str) -> Any:

@@ -6,7 +6,7 @@ watch.check(measured); watch.see(now, measured); watch.command(now, wanted, push
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -35,6 +35,7 @@ class Watch:
     Attributes:
         delays: ``(n_joints,)`` s between a command and the motion; inf: unknown, so no joint stalls.
         errors: ``(n_joints,)`` rad, steady errors, sag included.
+        last: time (s) and readings of the last look; None: none since torque is on.
     """
 
     def __init__(
@@ -43,16 +44,11 @@ class Watch:
         self._joints, self._low, self._high, self._tolerance = joints, ranges.low, ranges.high, tolerance
         self._stall, self._speed, self._step = stall, speed, step
         self.delays, self.errors = np.full(len(joints), np.inf), np.zeros(len(joints))
-        self.forget()
-
-    def forget(self) -> None:
-        """The arm was without torque: its joints may be anywhere now."""
-        self._last: tuple[float, Array] | None = None
+        self.last: tuple[float, Array] | None = None
 
     def check(self, measured: Array) -> Array:
         """The readings, none of which lies outside the range of its joint."""
-        outside = np.maximum(self._low - measured, measured - self._high) > self._tolerance
-        for k in _where(outside):
+        for k in np.flatnonzero(np.abs(measured - measured.clip(self._low, self._high)) > self._tolerance).tolist():
             raise SimulationError(
                 f"{self._told(k, measured)}; is its unit or its calibration another one? torque is off"
             )
@@ -74,16 +70,16 @@ class Watch:
         Raises:
             SimulationError: a joint has jumped, or stalls.
         """
-        if self._last is not None:
-            before, readings = self._last
+        if self.last is not None:
+            before, readings = self.last
             most = self._step + FASTER * self._speed * (now - before)
-            for k in _where(np.abs(measured - readings) > most):
+            for k in np.flatnonzero(np.abs(measured - readings) > most).tolist():
                 told = f"{self._told(k, measured)}, {now - before:.2g} s after {readings[k]:.3g} rad"
                 raise SimulationError(f"{told}: no joint moves that far in the time; torque is off")
-        self._last = now, measured
+        self.last = now, measured
         self._seen.append(measured)
         first = self._seen[0] if np.isinf(self.delays).any() else measured
-        for k in _where(np.abs(measured - first) > 2 * FIRST + self._tolerance):
+        for k in np.flatnonzero(np.abs(measured - first) > 2 * FIRST + self._tolerance).tolist():
             told = f"{self._told(k, measured)}, after {first[k]:.3g} rad and a first step of {FIRST:g} rad"
             raise SimulationError(f"{told}: does it read what it is commanded in? torque is off")
         times, commands, gone = (np.array(part) for part in zip(*self._sent, strict=True))
@@ -96,13 +92,11 @@ class Watch:
         free = (behind <= min(self._stall, self._step)) | (np.abs(measured - self._free) > MOVED)
         free |= now - self._begun < BEGUN + self.delays
         self._free_at[free], self._free[free], self._gone[free] = now, measured[free], gone[free]
-        for k in _where((gone - self._gone > self._stall) & (now - self._free_at > HELD + self.delays / 2)):
+        for k in np.flatnonzero(
+            (gone - self._gone > self._stall) & (now - self._free_at > HELD + self.delays / 2)
+        ).tolist():
             told = f"{self._joints[k]} stalls at {measured[k]:.3g} rad on its way to {commands[-1, k]:.3g}"
             raise SimulationError(f"{told}; torque is off")
-
-    def settled(self, errors: Array) -> None:
-        """Learn the errors (rad) of joints that have settled."""
-        self.errors = np.maximum(self.errors, np.abs(errors))
 
     def learn(self, k: int) -> None:
         """Measure how late joint ``k`` has followed its first step, the movement that ends now.
@@ -121,9 +115,4 @@ class Watch:
         self.delays[k] = self._sent[1 + late][0] - self._sent[1 + due][0]
 
     def _told(self, k: int, measured: Array) -> str:
-        reads = f"{self._joints[k]} reads {measured[k]:.4g} rad"
-        return f"{reads}, its range is {self._low[k]:.3g} to {self._high[k]:.3g}"
-
-
-def _where(found: Any) -> list[int]:
-    return [int(k) for k in np.flatnonzero(found)]
+        return f"{self._joints[k]} reads {measured[k]:.4g} rad, its range is {self._low[k]:.3g} to {self._high[k]:.3g}"

@@ -42,7 +42,7 @@ from sgimd_torch.extras.models.places import (
     pulled,
     slides_on,
 )
-from sgimd_torch.extras.models.posture import touching
+from sgimd_torch.extras.models.posture import first_touch, touching
 from sgimd_torch.spaces import Array, Box, check_count, check_point, check_rng, read_only, stream
 
 EXPLORED: Final = 300  # number of random movements that find T
@@ -55,6 +55,7 @@ FINEST: Final = 1e-4  # share of T's longest side that a small object at rest ma
 TREMBLE: Final = 1e-6  # m or rad; an object at rest trembles less, which must not look like an effect of a movement
 MOST_STEPS: Final = 100_000  # largest number of timesteps of a movement
 POSTURES: Final = 5000  # number of random postures that show what is within reach
+LOOKED_EVERY: Final = 0.01  # s between two looks at what touches on a way
 _BLOCK: Final = 32  # number of movements simulated in parallel
 _STATE: Final = mujoco.mjtState.mjSTATE_FULLPHYSICS
 _FRAMES: Final = 25.0  # drawings of a movement per second
@@ -233,10 +234,9 @@ class MujocoRobot:
         low, high = np.clip(low, *limits), np.clip(high, *limits)
         start, outcomes, rng = displaced * self._read(self._home), list[Array](), stream(0, "postures")
         for _ in range(POSTURES):
-            outcome = self.outcome_at(rng.uniform(low, high)) - start
-            mujoco.mj_collision(model, data := self._data[0])
-            if not touching(model, data, self.bodies, alone=False):
-                outcomes.append(outcome)
+            joints = rng.uniform(low, high)
+            if not self.posture_touches(joints):
+                outcomes.append(self.outcome_at(joints) - start)
         return np.reshape(outcomes, (-1, self._dim))
 
     @property
@@ -247,6 +247,20 @@ class MujocoRobot:
     def commanded(self, theta: Array) -> Array:
         """``(n_steps, n_commands)``, commands of a movement without noise, one for each timestep of the model."""
         return self._commands(theta, stream(0, "no noise"))[:, self._actuators]
+
+    def touches(self, commands: Array, clearance: float) -> str:
+        """What touches first on the simulated way of ``commands`` ``(n_steps, n_commands)``; see `first_touch`."""
+        sent = np.tile(self._held, (len(commands), 1))
+        sent[:, self._actuators] = commands
+        (states,) = self._simulate(np.zeros((1, self.contexts.dim)), [sent])
+        every = max(1, round(LOOKED_EVERY / self.model.opt.timestep))
+        return "" if states is None else first_touch(self.model, states[::every], self.bodies, clearance)
+
+    def posture_touches(self, joints: Array) -> bool:
+        """Whether the robot touches itself or anything when its joints are at ``(n_joints,)`` rad."""
+        self.outcome_at(joints)
+        mujoco.mj_collision(self.model, data := self._data[0])
+        return bool(touching(self.model, data, self.bodies, alone=False))
 
     def outcome_at(self, joints: Array) -> Array:
         """``(outcome_dim,)``, measured places when the robot's joints are at ``(n_joints,)`` rad; other things rest."""

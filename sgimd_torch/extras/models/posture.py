@@ -17,6 +17,7 @@ from sgimd_torch.extras.models.places import movable
 from sgimd_torch.spaces import Array
 
 NEAR: Final = 0.004  # m, distance of two geoms that counts as a contact while a posture is looked for
+SLACK: Final = 0.001  # m, by which what is near at the start may come nearer
 _WEIGHTS: Final = (1e3, 1e5, 1e7)  # 1/m^2, growing weight of contacts against the way (rad or m) to a posture
 
 
@@ -73,6 +74,35 @@ def nearest_posture(model: mujoco.MjModel, home: Array, joints: Sequence[int], b
         q = minimize(cost, q, (weight,), "L-BFGS-B", jac=True, bounds=[*zip(low, high, strict=True)]).x
     data.qpos[angles] = q
     return np.array(data.qpos)
+
+
+def first_touch(model: mujoco.MjModel, states: Array, bodies: Sequence[int], clearance: float) -> str:
+    """What touches first on a way of full physics ``states`` ``(n, n_state)``, such as "hand and table"; "" if nothing.
+
+    ``bodies`` touch each other or their base at a distance of 0 m, and what stands still at ``clearance`` (m). What is
+    so near at the start may stay so near. Things that can move may be touched.
+    """
+    wide = copy.copy(model)
+    wide.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_OVERRIDE)
+    wide.opt.o_margin = clearance
+    data, allowed = mujoco.MjData(wide), dict[tuple[int, ...], float]()
+    base = {int(model.body_parentid[body]) for body in bodies} - {0}
+    for row, state in enumerate(states):
+        mujoco.mj_setState(wide, data, state, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+        mujoco.mj_kinematics(wide, data)
+        mujoco.mj_collision(wide, data)
+        for contact in data.contact:
+            pair = tuple(contact.geom.tolist())
+            ends = {int(model.geom_bodyid[geom]) for geom in pair}
+            others = ends - {*bodies}
+            if min(pair) < 0 or others == ends or any(model.body_weldid[other] for other in others):
+                continue
+            own = others <= base
+            if row == 0 and contact.dist < (0 if own else clearance):
+                allowed[pair] = -np.inf if own else min(allowed.get(pair, np.inf), contact.dist - SLACK)
+            if contact.dist < allowed.get(pair, 0 if own else clearance):
+                return " and ".join(model.geom(k).name or model.body(model.geom_bodyid[k]).name for k in pair)
+    return ""
 
 
 def _contacts(data: mujoco.MjData, near: float = 0.0) -> list[mujoco.MjContact]:

@@ -12,13 +12,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from math import pi
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
 from sgimd_torch.extras.recordings.columns import Recording
 from sgimd_torch.spaces import Array, Box
 
+MODES: Final = {"degrees": "deg", "range_0_100": "0:100", "range_m100_100": "-100:100"}  # by LeRobot's MotorNormMode
 _RANGE: Final = re.compile(r"(-?\d+\.?\d*):(-?\d+\.?\d*)", re.ASCII)
 _TURN: Final = 7.0  # rad, a little more than a turn; a joint that reads more may be in degrees
 _MOVES: Final = 0.02  # rad/s; joints that were never faster count as unmoved
@@ -139,6 +140,36 @@ def units_of(joints: Sequence[str], units: Mapping[str, str]) -> dict[str, str]:
             raise ValueError(f"unit {key}={unit}: no joint is named {key}; did you mean {near}?")
         unit_of |= dict.fromkeys(named, unit)
     return unit_of
+
+
+def motor_unit(buses: Sequence[Any], motor: str) -> str:
+    """The unit that this motor of one of the ``buses`` of LeRobot reads, "" if it is unknown."""
+    tables = [bus.motors for bus in buses if isinstance(getattr(bus, "motors", None), Mapping)]
+    modes = [table[motor].norm_mode for table in tables if hasattr(table.get(motor), "norm_mode")]
+    return MODES.get(modes[0].value, "") if modes else ""
+
+
+def scales_of(joints: Sequence[str], units: str, ranges: Box, reads: Mapping[str, str]) -> tuple[Array, Array]:
+    """``(n_joints,)`` scales and shifts that make rad of what joints read; see `in_rad`.
+
+    Args:
+        joints: names of the joints.
+        units: units as a user writes them, one for each joint.
+        ranges: ``(n_joints,)`` ranges of the joints (rad).
+        reads: known units by motor, one for each joint, in their order; "" if a unit is not known.
+
+    Raises:
+        ValueError: a joint has no unit, or another one than its motor.
+    """
+    unit_of = units_of(joints, units_from(units))
+    if lacking := [joint for joint in joints if joint not in unit_of]:
+        raise ValueError(f"units has none for {', '.join(lacking)}; deg,gripper=0:100 is deg for all but gripper")
+    for joint, (motor, unit) in zip(joints, reads.items(), strict=True):
+        if unit_of[joint] in ("deg", "rad") and unit not in ("", unit_of[joint]):
+            raise ValueError(f"{motor} reads {unit}, not {unit_of[joint]}: units {joint}={unit}")
+    sides = zip(joints, ranges.low.tolist(), ranges.high.tolist(), strict=True)
+    scales, shifts = np.array([in_rad(name, unit_of[name], (low, high)) for name, low, high in sides]).T
+    return scales, shifts
 
 
 def in_rad(joint: str, unit: str, side: tuple[float, float] | None) -> tuple[float, float]:

@@ -7,8 +7,10 @@ import time
 import numpy as np
 import pytest
 
-from arms import interrupt, on_table, write
-from sgimd_torch import SimulationError, stream
+from arms import interrupt, on_table, upright, write
+from sgimd_torch import SimulationError, random_exploration, run, stream
+from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.environments.protocol import NotExecutedError
 from sgimd_torch.runs.signals import Overdue
 
 NONE, RNG = np.zeros(0), stream(0, "arm")
@@ -74,9 +76,39 @@ def test_a_soft_and_late_arm_does_not_stall_where_nothing_is_in_its_way(tmp_path
     built.write_text(text)
     arm, on = on_table(write(tmp_path / "arm.xml"), built, of_arm={"delay": delay, "noise": 0.2})
     on.data.qpos[:3] = 1.0
-    for k in range(25):
+    for k in range(12):
         arm.execute(NONE, arm.policies.sample(stream(k, "soft")), RNG)
     assert on.torque
+
+
+def test_a_movement_that_would_touch_the_table_is_not_executed_and_few_are_tried(tmp_path):
+    built = upright(write(tmp_path / "built.xml", offsets=(2, -2, 2)))
+    arm, on = on_table(upright(write(tmp_path / "arm.xml")), built, outcome="site:tip:xz", of_arm={"delay": 0.05})
+    touched, refused = 0, []
+    for k in range(25):
+        before, commands = on.touches, len(on.sent)
+        try:
+            arm.execute(NONE, stream(k, "anything").random(13), RNG)
+        except NotExecutedError as error:
+            refused.append((str(error), len(on.sent) - commands))
+        touched += on.touches > before
+    assert touched <= 1
+    assert len(refused) >= 10
+    assert all(sent == 0 and "table" in told for told, sent in refused)
+    for k in range(5):
+        arm.execute(NONE, arm.policies.sample(stream(k, "random")), RNG)
+    assert on.touches == 0
+    assert on.torque
+
+
+def test_movements_that_are_not_executed_do_not_end_a_run(tmp_path):
+    class Careful(PlanarArm):
+        def execute(self, context, theta, rng):
+            raise NotExecutedError("it would hit the table")
+
+    robot = Careful(3)
+    made = list(run(random_exploration(robot, 0), robot, 0, movements=15))
+    assert [episode.failed for episode in made] == ["it would hit the table"] * 15
 
 
 def hang():

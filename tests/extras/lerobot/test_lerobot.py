@@ -87,7 +87,7 @@ def test_torque_is_off_soon_after_anything_goes_wrong_and_the_next_movement_goes
     at = on.clock.now + 0.3
     on.events[at] = partial(happens, on)
     errors = KeyboardInterrupt if fault == "Ctrl-C" else (SimulationError, KeyError, RuntimeError)
-    warnings.filterwarnings("ignore", "torque may still be on")  # an overloaded motor does not confirm it
+    warnings.filterwarnings("ignore", "torque may be on")  # an overloaded motor does not confirm it
     with pytest.raises(errors) as failed:
         arm.execute(NONE, FAR, RNG)
     assert re.search(reason, str(failed.value.__context__ if fault == "Ctrl-C" else failed.value))
@@ -122,7 +122,7 @@ def test_lost_packets_do_not_matter(model):
 def test_an_unplugged_arm_fails_and_says_that_torque_may_be_on_until_it_is_plugged_in_again(model):
     arm, on = on_table(model)
     on.events[0.5] = lambda: setattr(on, "unplugged", True)
-    with pytest.warns(RuntimeWarning, match="torque may still be on, switch off"), pytest.raises(ConnectionError):
+    with pytest.warns(RuntimeWarning, match="torque may be on, switch off"), pytest.raises(ConnectionError):
         arm.execute(NONE, FAR, RNG)
     assert on.asked_off < 0.5 + QUIET
     with pytest.warns(RuntimeWarning), pytest.raises(ConnectionError, match="no such port"):
