@@ -1,27 +1,24 @@
 """The curves of a board: numbers by tag, computed from episodes, evaluations and regions.
 
-Section 3.2.1 of Nguyen & Oudeyer (2014) defines interest and competence of a region.
-    behaviour = Behaviour(0.02); behaviour.episode(episode); behaviour.curves(); region_curves(interest_map.regions)
-    own = OwnRegions(problem); own.follow(behaviour); region_curves(own.regions)
+behaviour = Behaviour(0.02); behaviour.episode(episode); behaviour.curves(); region_curves(interest_map.regions)
+places = Places(benchmark, problem); places.add(outcomes); places.curves(evaluation.errors)
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from functools import partial
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from sgimd_torch.evaluation import Evaluation, OwnGoals
-from sgimd_torch.goals.regions import Region, Tiling, absolute_progress, interest_of
+from sgimd_torch.evaluation import Benchmark, Evaluation, OwnGoals
+from sgimd_torch.goals.regions import Region
 from sgimd_torch.parts import Problem
-from sgimd_torch.spaces import Array, Episode
+from sgimd_torch.spaces import Array, Box, Episode
 
-DEPTH: Final = 3  # levels of the tree of regions, below its root, that have curves; so at most 15 regions have them
-MOST: Final = 40  # largest number of goals in an own region; with more, it is cut, or forgets the oldest quarter
-INTEREST: Final = partial(interest_of, window=24, progress=absolute_progress)  # eq. (3), of own regions
+TILES: Final = 4  # number of tiles of T along each of its first two dimensions
 
 
 class Behaviour:
@@ -30,39 +27,55 @@ class Behaviour:
     Args:
         tolerance: distance, in the unit of T, at which a goal counts as reached.
         at_once: number of robots that move at once.
+
+    Attributes:
+        goals, outcomes: goals of the learner's own, each once, and outcomes, since the last ``curves``.
+        shown: outcomes of all demonstrations so far.
+        failures: number of failed movements so far, by reason.
     """
 
     def __init__(self, tolerance: float, at_once: int = 1) -> None:
         self.tolerance, self.own, self._movements = tolerance, OwnGoals(at_once), 0
-        self.points: list[tuple[Array, Array]] = []  # context and goal, for each goal of ``own``
+        self.goals, self.outcomes, self.shown = dict[bytes, Array](), list[Array](), list[Array]()
+        self.failures: Counter[str] = Counter()
         self._since: Counter[str] = Counter()  # number of movements since the last point, by tag
         self._imitated: list[float] = []  # distances missed by imitations since the last point
-        self._demonstrations = self._answered = 0
+        self._answered = 0
 
     def episode(self, episode: Episode) -> None:
         """Count a movement."""
-        move, self._movements = episode.move, episode.index + 1
-        self._demonstrations += episode.demonstration is not None
+        move, outcome, self._movements = episode.move, episode.outcome, episode.index + 1
+        if episode.demonstration is not None:
+            self.shown.append(episode.demonstration.outcome)
+        if episode.failed:
+            self.failures[episode.failed] += 1
         kind = "failed" if episode.failed else "rest" if move is None else move.origin
         self._since[f"kind/{kind}"] += 1
         if episode.request is not None:
             self._answered += episode.reply == "shown"
             self._since[f"strategy/{episode.request.strategy}"] += 1
-        if move is None or move.goal is None or episode.outcome is None:
+        if outcome is not None:
+            self.outcomes.append(outcome)
+        if move is None or move.goal is None:
             return
-        if move.origin == "imitate":
-            self._imitated.append(float(np.linalg.norm(episode.outcome - move.goal)))
-        elif move.origin != "global":
-            self.own.add(episode.index, move.goal, episode.outcome)
-            if len(self.points) < len(self.own.missed):
-                self.points.append((episode.context, move.goal))
+        if move.origin != "imitate":
+            self.goals[move.goal.tobytes()] = move.goal
+        if outcome is not None and move.origin == "imitate":
+            self._imitated.append(float(np.linalg.norm(outcome - move.goal)))
+        elif outcome is not None and move.origin != "global":
+            self.own.add(episode.index, move.goal, outcome)
 
     def curves(self) -> dict[str, float]:
         """Values of the curves by tag: shares and means since the last call, counts since the first movement."""
         total = sum(n for tag, n in self._since.items() if tag.startswith("kind/"))
         values = {tag: n / total for tag, n in self._since.items()}
         self._since = Counter(dict.fromkeys(self._since, 0))  # known tags keep their curves, at 0
-        values["teacher/demonstrations"] = self._demonstrations
+        self.goals.clear()
+        self.outcomes.clear()
+        if self.failures:
+            values["failed/movements"] = self.failures.total()
+        if self.shown:
+            values["teacher/demonstrations"] = len(self.shown)
         if any(tag.startswith("strategy/") for tag in values):
             values["teacher/replies"] = self._answered
         if self._imitated:
@@ -73,6 +86,54 @@ class Behaviour:
             values["goals/reached"] = float((missed_by <= self.tolerance).mean())
             values["goals/missed_by"] = float(np.median(missed_by))
         return values
+
+
+class Places:
+    """Competence by tile of T, and coverage of T, both at the goals of a benchmark: the same for all learners.
+
+    Args:
+        benchmark: goals of the evaluations.
+        problem: problem of the learner, whose T, rest and tolerance are read.
+
+    Attributes:
+        missed: ``(n,)``, distance from each goal to the nearest outcome so far.
+    """
+
+    def __init__(self, benchmark: Benchmark, problem: Problem) -> None:
+        self._goals, self._near = benchmark.goals, benchmark.side / 2
+        self._far = np.maximum(np.linalg.norm(benchmark.goals - problem.rest, axis=1), problem.tolerance)
+        self._tiles = tiles_of(benchmark.goals, problem.outcomes)
+        self.missed = np.full(len(benchmark.goals), np.inf)
+
+    def add(self, outcomes: Sequence[Array]) -> None:
+        """Note new outcomes."""
+        for outcome in outcomes:
+            self.missed = np.minimum(self.missed, np.linalg.norm(self._goals - outcome, axis=1))
+
+    @property
+    def coverage(self) -> float:
+        """Share of the goals with an outcome as near as a goal has to be to count as met."""
+        return float((self.missed <= self._near).mean())
+
+    def curves(self, missed: Array) -> dict[str, float]:
+        """Mean competence, eq. (7), by tile and of all goals, where the goals are ``missed`` ``(n,)`` by so much."""
+        competences = -np.minimum(1.0, missed / self._far)
+        values = {f"competence/{place}": float(competences[inside].mean()) for place, inside in self._tiles.items()}
+        return {"competence/mean": float(competences.mean()), **values}
+
+
+def tiles_of(goals: Array, box: Box) -> dict[str, NDArray[np.bool_]]:
+    """The ``goals`` ``(n, outcome_dim)`` in each tile of T, masks ``(n,)``, by the place of the tile, such as
+    "x -1..0, y 0..1". Tiles divide the first two dimensions of T, ``box``; those without goals are left out."""
+    cells = np.clip(np.floor((goals - box.low) / box.sides * TILES), 0, TILES - 1)[:, :2]
+    masks = {}
+    for cell in np.unique(cells, axis=0):
+        lows = box.low[:2] + cell / TILES * box.sides[:2]
+        highs = lows + box.sides[:2] / TILES
+        names = box.names or [f"outcome {k}" for k in range(box.dim)]
+        place = ", ".join(f"{name} {a:.4g}..{b:.4g}" for name, a, b in zip(names, lows, highs, strict=False))
+        masks[place] = (cells == cell).all(axis=1)
+    return masks
 
 
 def evaluation_curves(evaluation: Evaluation, near: float) -> dict[str, float]:
@@ -88,74 +149,10 @@ def evaluation_curves(evaluation: Evaluation, near: float) -> dict[str, float]:
 
 
 def region_curves(regions: Sequence[Region]) -> dict[str, float]:
-    """Mean competence and mean interest, by tag, of each node of the tree whose leaves are ``regions``.
-
-    The means are over the remembered goals of all leaves below the node. A node without goals has no curve.
-    """
-    values: dict[str, float] = {"regions/count": len(regions)} if regions else {}
-    goals = {region: len(region.competences) for region in regions}
-    sums = {region: np.array([region.competences.sum(), goals[region] * region.interest()]) for region in regions}
-    for path, leaves in branches(regions).items():
-        if n := sum(goals[region] for region in leaves):
-            competence, interest = sum((sums[region] for region in leaves), np.zeros(2)).tolist()
-            values[f"competence/{path}"], values[f"interest/{path}"] = competence / n, interest / n
-    return values
-
-
-def branches(regions: Sequence[Region]) -> Mapping[str, list[Region]]:
-    """The leaves below each node of the tree of regions, by the path of the node; deepest nodes are at level ``DEPTH``.
-
-    Cells that never split, such as "R.3.7", form no tree: "R" is their only node.
-    """
-    leaves_below: dict[str, list[Region]] = {}
-    for region in regions:
-        path = region.path.partition(".")[0]
-        for length in range(1, min(len(path), DEPTH + 1) + 1):
-            leaves_below.setdefault(path[:length], []).append(region)
-    return dict(sorted(leaves_below.items()))
-
-
-class OwnRegions:
-    """Regions of C x T for a learner whose goal model has none, such as practice; the board makes them for its own use.
-
-    They tile C x T and remember their latest goals. They are those of section 3.2.1, eqs. (3) and (7), but cut at
-    medians. Nothing is drawn at random.
-
-    Args:
-        problem: problem of the learner, whose spaces, rest and tolerance are read.
-    """
-
-    def __init__(self, problem: Problem) -> None:
-        self._problem, self._whole = problem, Tiling(problem, INTEREST, modes=(0, 1, 0), near=1)
-        self._n_added, self.regions = 0, list[Region]()  # no regions before the first goal
-
-    def follow(self, behaviour: Behaviour) -> None:
-        """Add the new goals of a learner, but not yet the last ones, which may still be pursued."""
-        new = slice(self._n_added, len(behaviour.points) - behaviour.own.at_once)
-        if new.start >= new.stop:
-            return
-        self._n_added, problem, box = new.stop, self._problem, self._whole.box
-        contexts, goals = map(np.array, zip(*behaviour.points[new], strict=True))
-        points, missed_by = np.hstack((contexts, goals)), np.array(behaviour.own.missed[new])
-        far = np.linalg.norm(goals - problem.rest, axis=1)
-        competences = -np.minimum(1.0, missed_by / np.maximum(far, problem.tolerance))  # eq. (7)
-        points = np.clip(points, box.low, np.nextafter(box.high, box.low))  # goals outside T count at its border
-        leaves = []
-        for region in self.regions or self._whole.regions:
-            inside = ((region.low <= points) & (points < region.high)).all(axis=1)
-            if n := int(inside.sum()):
-                region = region.extend(points[inside], competences[inside], np.zeros(n), np.full(n, "autonomous"))
-            leaves += self._cut(region)
-        self.regions = leaves
-
-    def _cut(self, region: Region) -> list[Region]:
-        """The parts of a region, cut at the median of its goals along the axis in which they differ most."""
-        if len(region.points) <= MOST:
-            return [region]
-        if len(region.path) <= DEPTH:
-            cuts = np.median(region.points, axis=0)
-            spread = region.points.std(axis=0) / self._whole.box.sides * (region.points < cuts).any(axis=0)
-            axis = int(spread.argmax())
-            if spread[axis]:
-                return [part for half in region.split(axis, float(cuts[axis])) for part in self._cut(half)]
-        return [region.keep(slice(-MOST * 3 // 4, None))]
+    """Number of regions, by tag, and the means of competence and interest over the goals that they remember."""
+    n = np.array([len(region.goals) for region in regions])
+    if not n.any():
+        return {}
+    competence = sum(region.competences.sum() for region in regions) / n.sum()
+    interest = n @ [region.interest() for region in regions] / n.sum()
+    return {"regions/count": len(regions), "regions/competence": competence, "regions/interest": float(interest)}

@@ -15,21 +15,25 @@ LEGEND: Final[Mapping[str, str]] = {
     "error/noise_floor": "Part UNIT of error/mean that motor noise alone makes.",
     "error": "Mean error UNIT with the inverse model that the tag names, in place of the learner's own, if "
     "--evaluated-by adds one. It compares what the learners remember, whatever their inverse models are.",
-    "competence": "Mean competence of the goals that a region remembers: 0 is a goal that is met, -1 an outcome no "
-    "better than rest. R is all of C x T, R0 and R1 are its two parts, R01 is a part of R0; map/competence shows the "
-    "regions. Each run has its own regions. After a cut of a region, its curve is the mean over its parts' goals. If "
-    "the goal model has no regions, as in practice, the board makes regions from the learner's own goals; the "
-    "competence of a goal is then that of its attempt's nearest outcome, eq. (7). The learner does not use them. As "
-    "practice prefers goals that it is unsure of, they may stay low while error/mean falls.",
-    "interest": "Recent change of competence in a region, eq. (3). A goal model with regions draws more goals where "
-    "interest is high. After a cut of a region, its curve is the mean over its parts' goals.",
-    "regions": "Number of regions of the goal model, or of those that the board makes.",
+    "competence": "Mean competence of the answers of an evaluation, eq. (7), by tile of T and over all goals: 0 is "
+    "a goal that is met, -1 an outcome no better than rest. Tiles, 4 x 4 over the first two dimensions of T, are "
+    "the same for all learners, so the one that errs less has the higher curves. If nothing is evaluated, the nearest "
+    "outcome so far stands for the answer.",
+    "regions/count": "Number of regions of the goal model; map/regions and map/interest show them.",
+    "regions/competence": "Mean competence of the goals that the regions remember, as the learner judges it. It "
+    "compares no learners, because each chooses its goals.",
+    "regions/interest": "Mean interest, eq. (3), over the goals that the regions remember.",
+    "outcomes/coverage": "Share of the benchmark goals with an outcome of a movement so far within half the side of a "
+    "benchmark tile.",
+    "outcomes": "Outcomes UNIT since the last point, in one dimension of T.",
+    "failed/movements": "Number of movements so far that failed; about/failures has the reasons.",
     "kind": "Share of each kind of movement since the last point: global exploration, local optimisation, imitation, "
     "babbling, rest, or failed movements.",
     "goals/met": "Share of the benchmark goals whose error is at most half the side of a benchmark tile.",
     "goals/reached": "Share of the last 50 goals of the learner that a movement reached within the tolerance.",
     "goals/missed_by": "Median over the last 50 goals of the learner of the distance UNIT from a goal to its nearest "
     "outcome. Global exploration does not count.",
+    "goals": "Goals UNIT of the learner's own since the last point, in one dimension of T.",
     "teacher/demonstrations": "Number of demonstrations so far.",
     "teacher/replies": "Number of requests so far that a teacher replied to with a demonstration.",
     "teacher/missed_by": "Mean distance UNIT from a demonstrated outcome to the outcomes of its imitations, since the "
@@ -46,9 +50,11 @@ LEGEND: Final[Mapping[str, str]] = {
     "model/coverage": "Share of the newest outcomes that lie in the 80 % regions of their predictions.",
     "time/training_step": "Time (s) of a step of the optimiser, at the last refresh of the forward model.",
     "time": "Time (s) spent so far, by part of the run. Replayed movements have no times.",
-    "map/competence": "Regions, named as in the curves, coloured by the mean competence of the goals they remember.",
+    "map/regions": "Regions of the goal model, coloured by the mean competence of the goals they remember.",
+    "map/interest": "Regions of the goal model, coloured by interest, eq. (3): more goals are drawn where it is high.",
     "map/error": "Benchmark goals, coloured by their error at this evaluation. The logarithmic scale depends on T "
-    "alone, so runs can be compared. If T has one dimension, errors over goals.",
+    "alone, so runs can be compared. Crosses are outcomes of demonstrations. If T has one "
+    "dimension, errors over goals.",
 }
 
 

@@ -7,7 +7,6 @@ A resumed run first tells its listeners its whole record. So the board is writte
 
 from __future__ import annotations
 
-import json
 import math
 import re
 import time
@@ -22,16 +21,20 @@ from tensorboardX.event_file_writer import EventsWriter
 from tensorboardX.proto.event_pb2 import Event, SessionLog
 from tensorboardX.proto.summary_pb2 import Summary
 
-from sgimd_torch.board.curves import Behaviour, OwnRegions, evaluation_curves, region_curves
+from sgimd_torch.board.curves import Behaviour, Places, evaluation_curves, region_curves
 from sgimd_torch.board.legend import as_markdown, meaning_of
 from sgimd_torch.evaluation import Benchmark, Evaluation
-from sgimd_torch.goals.regions import Region
+from sgimd_torch.options.config import Config, dashed
+from sgimd_torch.runs.directory import not_compared
 from sgimd_torch.runs.hooks import Listener
-from sgimd_torch.spaces import Box, Episode
+from sgimd_torch.spaces import Array, Box, Episode
+from sgimd_torch.texts import as_text
 
 EVERY: Final = 50  # number of movements from one point of a curve to the next
-NO_REGIONS: Final = f"No competence per region: the learner pursued no goal of its own in its first {EVERY} movements."
-HAS_REGIONS: Final = "From here on competence/*, interest/* and map/competence show regions."
+BINS: Final = 30  # number of bins of a histogram, over T
+MOST_TOLD: Final = 10  # largest number of reasons for failures that are told
+COLUMNS: Final = ("algorithm", "environment", "seed", "inverse", "search", "goals", "memory", "explore", "social")
+"""Columns that every run has in the table of hyperparameters."""
 
 
 class EventFile:
@@ -91,6 +94,10 @@ class BoardListener(EventFile, Listener):
         parts: parts of the run; only config, environment, learner and benchmark are used.
         seconds: function that returns the seconds spent so far, by part of the run.
         curves: function that returns the new numbers of other listeners for the board, by tag.
+
+    Attributes:
+        behaviour: what the learner and its teachers did so far.
+        trackers: functions that get each point of the curves, too: number of movements, and values by tag.
     """
 
     def __init__(
@@ -104,10 +111,10 @@ class BoardListener(EventFile, Listener):
         self._config, self._learner, self._seconds, self._curves = parts.config, parts.learner, seconds, curves
         self._space: Box = parts.environment.outcomes
         self._benchmark: Benchmark = parts.benchmark
-        self._behaviour = Behaviour(parts.learner.problem.tolerance, parts.robots)
-        self._own = OwnRegions(parts.learner.problem)
-        self._movements = self._changes = 0
-        self._has_regions = True  # until a board without them says so
+        self.behaviour = Behaviour(parts.learner.problem.tolerance, parts.robots)
+        self._places = Places(parts.benchmark, parts.learner.problem)
+        self._movements = self._changes = self._failed = 0
+        self.trackers: list[Callable[[int, Mapping[str, float]], object]] = []
         self._explained: set[str] = set()
         # The result on TensorBoard's page of hyperparameters.
         result = "error/mean" if parts.config.evaluations else "goals/missed_by"
@@ -119,15 +126,9 @@ class BoardListener(EventFile, Listener):
     def episode(self, episode: Episode, replayed: bool) -> None:
         """Count a movement; after every 50th movement the curves get a point. Replayed movements have no times."""
         self._movements = episode.index + 1
-        self._behaviour.episode(episode)
+        self.behaviour.episode(episode)
         if self._movements % EVERY == 0:
-            if not self._learner.regions:
-                self._own.follow(self._behaviour)
-            regions = self.regions
-            if bool(regions) != self._has_regions:
-                self._has_regions = bool(regions)
-                self.add(self._movements, summary.text("about/regions", HAS_REGIONS if regions else NO_REGIONS))
-            self._scalars({**self._behaviour.curves(), **region_curves(regions)})
+            self._point()
             if not replayed:
                 self._scalars({f"time/{name.removeprefix('seconds_')}": s for name, s in self._seconds().items()})
         if curves := self._curves():
@@ -140,12 +141,32 @@ class BoardListener(EventFile, Listener):
         """Show an evaluation; of inverse models other than the run's own, show only the mean error."""
         own = evaluations["own"]
         others = {f"error/by_{name}": other.mean_error for name, other in evaluations.items() if name != "own"}
-        self._scalars({**evaluation_curves(own, self._benchmark.side / 2), **others})
+        tiles = self._places.curves(own.errors)
+        self._scalars({**evaluation_curves(own, self._benchmark.side / 2), **others, **tiles})
 
-    @property
-    def regions(self) -> Sequence[Region]:
-        """Regions of the goal model; if it has none, those that the board has made."""
-        return self._learner.regions or self._own.regions
+    def _point(self) -> None:
+        """Add a point to the curves that need no evaluation, and to the histograms."""
+        behaviour, places = self.behaviour, self._places
+        self._show("histograms", self._histograms("goals", [*behaviour.goals.values()]))
+        self._show("histograms", self._histograms("outcomes", behaviour.outcomes))
+        places.add(behaviour.outcomes)
+        tiles = {} if self._config.evaluations else places.curves(places.missed)
+        known = {**behaviour.curves(), **region_curves(self._learner.regions), "outcomes/coverage": places.coverage}
+        self._scalars({**known, **tiles})
+        if (n := behaviour.failures.total()) > self._failed:
+            self._failed = n
+            told = "\n".join(f"- {times} times: {why}" for why, times in behaviour.failures.most_common(MOST_TOLD))
+            self.add(self._movements, summary.text("about/failures", told))
+
+    def _histograms(self, kind: str, points: Sequence[Array]) -> dict[str, Any]:
+        """Histograms of ``points``, each ``(outcome_dim,)``, by tag; points outside T count at its border."""
+        space, made = self._space, {}
+        for k in range(space.dim if points else 0):
+            bins = np.linspace(space.low[k], space.high[k], BINS + 1)
+            values = np.clip([point[k] for point in points], bins[0], bins[-1])
+            tag = f"{kind}/{space.names[k] if space.names else k}"
+            made[tag] = summary.histogram(tag, values, bins).value[0]
+        return made
 
     def show_pictures(self, pictures: Mapping[str, NDArray[np.uint8]]) -> None:
         """Add pictures ``(height, width, 4)`` by tag, at the last movement."""
@@ -155,8 +176,10 @@ class BoardListener(EventFile, Listener):
     def _scalars(self, values: Mapping[str, float]) -> None:
         """Add a point to each curve; ``values`` are by tag, and values that are not finite are left out."""
         finite = {tag: value for tag, value in values.items() if math.isfinite(value)}
-        names = {tag: re.sub(r"[^-/\w.]", "_", tag) for tag in finite}  # as tensorboardX does, at a tenth of the time
+        names = {tag: re.sub(r"[^-/\w., ]", "_", tag) for tag in finite}
         self._show("scalars", {tag: Summary.Value(tag=names[tag], simple_value=finite[tag]) for tag in finite})
+        for tracker in self.trackers:
+            tracker(self._movements, {names[tag]: value for tag, value in finite.items()})
 
     def _show(self, plugin: str, values: Mapping[str, Any]) -> None:
         """Add values to TensorBoard's page ``plugin``, in one event; the first one of a tag carries its explanation."""
@@ -169,17 +192,17 @@ class BoardListener(EventFile, Listener):
             self.add(self._movements, Summary(value=[*values.values()]))
 
 
-def hparams_of(config: Any) -> dict[str, bool | float | str]:
+def hparams_of(config: Config) -> dict[str, bool | float | str]:
     """Options of a run for TensorBoard's page of hyperparameters, by their names on the command line.
 
-    These are algorithm, environment, seed, options of parts that differ from their defaults, and the options in the
-    name of the variant, such as "sgim-d,budget=5". So each run of a sweep has all options that the sweep varies.
+    TensorBoard shows the columns of the first run only. So each run has the same `COLUMNS`, the options in the name of
+    its variant, such as "sgim-d,budget=5", which a sweep varies, and "changed", all other options that differ from
+    their defaults.
     """
+    settings = {dashed(name): value for name, value in config.settings.items()}
     varied = re.findall(r"(?:^|,)([\w.-]+)=", config.variant)
-    settings = {name.replace("_", "-"): value for name, value in config.settings.items()}
-    chosen = ["algorithm", "environment", "seed", *(name.replace("_", "-") for name in dict(config.parts)), *varied]
-    return {
-        name: value if isinstance(value, bool | int | float | str) else json.dumps(value)
-        for name, value in settings.items()
-        if name in chosen
-    }
+    columns = dict.fromkeys([*COLUMNS, *(name for name in varied if name in settings)])
+    changed = [dashed(name) for name in dict(config.parts) if name not in not_compared()]
+    others = [f"{name}={as_text(settings[name])}" for name in changed if name not in columns]
+    values = {name: settings.get(name, "none") for name in columns} | {"changed": " ".join(others) or "nothing"}
+    return {name: v if isinstance(v, bool | int | float | str) else as_text(v) for name, v in values.items()}

@@ -1,5 +1,6 @@
 """The board: what its curves count, what its file holds, and that a resumed run leaves one continuous board."""
 
+from itertools import permutations
 from pathlib import Path
 
 import numpy as np
@@ -9,17 +10,20 @@ from tensorboardX import summary
 from boards import board_of, curves_of, hparams_of
 from own import MODULE
 from runs import content_of
-from sgimd_torch import stream
-from sgimd_torch.board.curves import Behaviour, OwnRegions, evaluation_curves, region_curves
+from sgimd_torch.board.curves import Behaviour, Places, evaluation_curves, region_curves, tiles_of
 from sgimd_torch.board.legend import LEGEND
 from sgimd_torch.board.listener import EventFile
-from sgimd_torch.competence import performance
-from sgimd_torch.evaluation import Benchmark, Evaluation, save_benchmark
+from sgimd_torch.board.listener import hparams_of as columns_of
+from sgimd_torch.environments.planar_arm import PlanarArm
+from sgimd_torch.evaluation import Benchmark, Evaluation, evaluate, grid_over, save_benchmark
+from sgimd_torch.options.config import Config
+from sgimd_torch.runs.build import build
 from sgimd_torch.runs.command import main
 from sgimd_torch.runs.program import command
 from sgimd_torch.runs.read import read_run
+from sgimd_torch.session import run
 from sgimd_torch.spaces import Box, Demonstration, Episode, Move, Request
-from worlds import PLANE, interest_map, problem
+from worlds import interest_map, problem
 
 GOAL, NEAR, FAR = np.array([0.5, 0.5]), np.array([0.5, 0.51]), np.array([0.5, 0.9])  # near: within the tolerance
 SHOWN = Demonstration(np.zeros(0), np.arange(2.0), np.zeros((2, 1)), np.array([-0.5, 0.5]))
@@ -89,40 +93,29 @@ def test_requests_are_counted_by_strategy():
     assert behaviour.curves()["strategy/imitate ann"] == 0
 
 
-def test_a_region_that_was_cut_goes_on_as_the_mean_over_the_goals_of_its_parts():
+def test_regions_count_and_have_the_means_over_the_goals_that_they_remember():
     regions = interest_map().regions
     values = region_curves(regions)
-    for path in ("R", "R0", "R10"):
-        below = [region for region in regions if region.path.startswith(path)]
-        assert len(below) > 1
-        goals = np.concatenate([region.competences for region in below])
-        interests = np.concatenate([np.full(len(region.goals), region.interest()) for region in below])
-        assert values[f"competence/{path}"] == pytest.approx(goals.mean())
-        assert values[f"interest/{path}"] == pytest.approx(interests.mean())
-    assert values["regions/count"] == len(regions)
+    assert values["regions/count"] == len(regions) > 1
+    assert values["regions/competence"] == pytest.approx(np.concatenate([r.competences for r in regions]).mean())
+    interests = np.concatenate([np.full(len(region.goals), region.interest()) for region in regions])
+    assert values["regions/interest"] == pytest.approx(interests.mean())
 
 
-def test_the_board_has_regions_for_goals_that_know_none_with_the_competence_of_the_best_outcome():
-    contexts = Box.cube(0.0, 1.0, 1)
-    world, rng, expected = problem(contexts=contexts, outcomes=PLANE), stream(0, "own regions"), {}
-    behaviour, own = Behaviour(0.02), OwnRegions(world)
-    for index in range(0, 1000, 2):
-        context, goal, outcomes = contexts.sample(rng), PLANE.sample(rng), rng.normal(0, 1, (2, 2))
-        for later, outcome in enumerate(outcomes):
-            behaviour.episode(Episode(index + later, context, Move(np.zeros(1), goal, "local"), outcome, None))
-        expected[(*context, *goal)] = performance(goal, outcomes, world.rest, world.tolerance).max()
-        if index % 50 == 48:
-            own.follow(behaviour)
-            remembered = {tuple(p): c for r in own.regions for p, c in zip(r.points, r.competences, strict=True)}
-            assert remembered == pytest.approx({point: expected[point] for point in remembered})
-            newest = [*expected][-20:-1]  # the last goal may still be pursued
-            assert remembered.keys() >= set(newest)
-            assert tuple([*expected][-1]) not in remembered
-    regions = own.regions
-    assert len(regions) == 8
-    assert all(((r.low <= r.points) & (r.points < r.high)).all() and len(r.points) <= 40 for r in regions)
-    assert sum(np.prod(r.high - r.low) for r in regions) == pytest.approx(4)  # the volume of C x T
-    assert sum(r.attempts for r in regions) >= 499 - 40  # a cut forgets no goal
+def test_a_tile_has_the_mean_competence_of_its_goals_and_the_name_of_its_place():
+    goals = np.array([[-0.9, 0.1], [-0.6, 0.4], [1.0, 1.0], [0.0, 0.0]])
+    places = Places(Benchmark("Any", goals, 0.1), problem(outcomes=Box.cube(-1, 1, 2, names=("x", "y"))))
+    values = places.curves(np.array([0.0, np.hypot(0.6, 0.4) / 2, 9.0, 0.005]))
+    assert values == pytest.approx(
+        {
+            "competence/x -1..-0.5, y 0..0.5": -0.25,
+            "competence/x 0..0.5, y 0..0.5": -0.25,  # at rest, where eq. (7) divides by the tolerance
+            "competence/x 0.5..1, y 0.5..1": -1,  # no worse, however far
+            "competence/mean": -0.4375,
+        }
+    )
+    places.add([np.array([-0.9, 0.14]), np.array([0.0, 0.06])])
+    assert places.coverage == 0.25
 
 
 def test_the_share_of_goals_met_is_counted():
@@ -153,6 +146,38 @@ def test_earlier_event_files_stay_until_the_replay_is_over(tmp_path):
     )  # otherwise an open TensorBoard ignores it
 
 
+SIX = ("random", "sagg-riac", "sgim-d", "practice", "practice-taught", "sagg-riac-letter")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [0, 1])
+def test_of_two_learners_the_one_that_errs_less_has_the_higher_curves(seed):
+    """At goals that the curves do not know, tile by tile, wherever errors differ by more than a fifth."""
+    errors, curves, movements = {}, {}, 300
+    for algorithm in SIX:
+        parts = build(Config(algorithm=algorithm, seed=seed, parts={"environment": "planar-arm-7"}))
+        learner, arm, benchmark = parts.learner, parts.environment, parts.benchmark
+        for _ in run(learner, arm, seed, movements=movements, teacher=parts.teacher):
+            pass
+        evaluation = evaluate(learner.inverse, arm, benchmark.goals, seed, movements, repeats=0)
+        curves[algorithm] = Places(benchmark, learner.problem).curves(evaluation.errors)
+        goals = grid_over(arm.outcomes, (24, 24))
+        goals = goals[arm.reachable(goals)]
+        missed = evaluate(learner.inverse, arm, goals, seed + 1, movements, repeats=0).errors
+        tiles = {f"competence/{place}": inside for place, inside in tiles_of(goals, arm.outcomes).items()}
+        tiles["competence/mean"] = np.full(len(goals), True)
+        errors[algorithm] = {tag: missed[inside].mean() for tag, inside in tiles.items()}
+    higher = {
+        (less, more, tag): curves[less][tag] > curves[more][tag]
+        for less, more in permutations(SIX, 2)
+        for tag in curves["random"]
+        if errors[less][tag] < 0.8 * errors[more][tag]
+    }
+    assert all(is_so for (_, _, tag), is_so in higher.items() if tag == "competence/mean")
+    assert len(higher) > 200
+    assert np.mean([*higher.values()]) > 0.97
+
+
 OPTIONS = ("--movements", "160", "--evaluate_at", "60,120", "--board", "true")
 
 
@@ -176,14 +201,15 @@ def test_the_curves_of_a_run_are_those_of_its_record(watched):
         assert curves[f"kind/{origin}"][50] == pytest.approx((first == origin).mean())
     shown = {step: (read.demonstration[:step] >= 0).sum() for step in (50, 100, 150)}
     assert curves["teacher/demonstrations"] == shown
-    assert curves["competence/R"].keys() == curves["time/physics"].keys() == {50, 100, 150}
+    assert curves["regions/interest"].keys() == curves["time/physics"].keys() == {50, 100, 150}
+    assert curves["competence/x 0..0.5, y 0.5..1"].keys() == curves["error/mean"].keys()
 
 
 @pytest.mark.filterwarnings("ignore:The inplace keyword:DeprecationWarning")  # of tbparse 0.0.9, in pandas 3.1
 def test_other_readers_find_every_curve(watched):
     found = pytest.importorskip("tbparse").SummaryReader(str(watched)).scalars
     assert set(found.tag) == curves_of(watched).keys()
-    assert {"error/mean", "goals/met", "competence/R"} < set(found.tag)
+    assert {"error/mean", "goals/met", "competence/mean"} < set(found.tag)
 
 
 def test_every_tag_is_explained_in_the_file_with_its_unit_and_in_the_legend(watched):
@@ -195,6 +221,11 @@ def test_every_tag_is_explained_in_the_file_with_its_unit_and_in_the_legend(watc
     assert all(f"**{tag}" in page.tensor_proto.string_val[0].decode() for tag in LEGEND)
 
 
+def content(board):
+    """The histograms of a board, by tag."""
+    return {tag: [(h.step, h.histogram_value) for h in board.Histograms(tag)] for tag in board.Tags()["histograms"]}
+
+
 def assert_same_board(directory, whole):
     """By tag, step and value; but for seconds, which a replayed movement does not have."""
     found, wanted = (
@@ -202,6 +233,15 @@ def assert_same_board(directory, whole):
         for each in (directory, whole)
     )
     assert found == wanted
+
+
+def test_runs_whose_parts_or_options_differ_have_different_rows_under_equal_columns():
+    changes = {}, {"inverse": "nearest"}, {"search": "perturb"}, {"goals.window": 12}, {"memory": "scan"}
+    rows = [columns_of(Config(algorithm="sgim-d", parts=parts)) for parts in changes]
+    rows.append(columns_of(Config(algorithm="practice")))
+    assert len({tuple(row.values()) for row in rows}) == len(rows)
+    assert len({tuple(row) for row in rows}) == 1
+    assert rows[3]["changed"] == "goals.window=12"
 
 
 def test_without_evaluations_there_are_curves_of_the_learners_own_goals_and_of_failures(own):
@@ -212,6 +252,11 @@ def test_without_evaluations_there_are_curves_of_the_learners_own_goals_and_of_f
     for movements in (50, 100, 150):
         assert curves["goals/missed_by"][movements] == pytest.approx(np.median(goals.recent_misses(movements)))
     assert not any(tag.startswith("error/") for tag in curves)
+    read = read_run(directory)
+    near = np.linalg.norm(read.outcomes[:100, None] - read.benchmark, axis=2).min(axis=0)
+    arm = PlanarArm(7)
+    expected = -np.minimum(1, near / np.linalg.norm(read.benchmark - arm.rest, axis=1)).mean()
+    assert curves["competence/mean"][100] == pytest.approx(expected, rel=1e-3)
     assert hparams_of(directory)[1] == ["goals/missed_by"]
 
 
@@ -221,7 +266,7 @@ MORE = [pytest.param(algorithm, marks=pytest.mark.slow) for algorithm in ("pract
 
 @pytest.mark.parametrize("algorithm", [*SOME, *MORE])
 def test_a_board_changes_no_byte_of_its_run_and_shows_it_from_the_first_movement_also_after_a_resume(own, algorithm):
-    """Regions, too: every learner with goals has competence per region, and others say that they have none."""
+    """Histograms, too."""
     save_benchmark("few.npz", Benchmark("PlanarArm", np.array([[0.5, 0.5], [-0.3, 0.2]]), 0.1))
     words = f"--environment planar-arm-7 --algorithm {algorithm} --repeats 0 --benchmark few.npz --out".split()
     all_of_it = ["--movements", "150", "--evaluate-at", "60,120"]
@@ -233,13 +278,9 @@ def test_a_board_changes_no_byte_of_its_run_and_shows_it_from_the_first_movement
     assert content_of(plain) == content_of(whole)
     assert_same_board(resumed, whole)
     assert curves_of(resumed)["time/physics"].keys() == {100, 150}  # nobody knows those of what was replayed
-    texts = board_of(whole).Tensors("about/regions/text_summary") if algorithm in ("random", "practice-taught") else []
-    begins = [(text.step, text.tensor_proto.string_val[0].decode()[:9]) for text in texts]
-    assert begins == [(50, "No compet"), (150, "From here")][: len(texts)]
-    if algorithm == "random":
-        assert len(texts) == 1
-    else:
-        assert 150 in curves_of(whole)["competence/R"].keys() & curves_of(whole)["interest/R"].keys()
+    made = content(board_of(whole))
+    assert made.keys() >= {"outcomes/x", "outcomes/y"} | ({"goals/x"} if algorithm != "random" else set())
+    assert made == content(board_of(resumed))
 
 
 @pytest.mark.parametrize("robot", ["sliders:Slider", "sliders:Slider3", "sliders:Shifted", "formula:Slider2"])
@@ -249,4 +290,4 @@ def test_outcomes_of_any_dimension_or_named_like_a_formula_have_curves(own, modu
     words = f"--environment {robot} --algorithm sagg-riac --movements 60 --evaluate-at 30 --repeats 0 --out runs"
     assert command(main, [*words.split(), "--board", "true"]) == 0
     directory = Path("runs/sagg-riac/seed-000")
-    assert {"error/mean", "competence/R", "interest/R", "goals/missed_by"} < curves_of(directory).keys()
+    assert {"error/mean", "competence/mean", "regions/interest", "goals/missed_by"} < curves_of(directory).keys()

@@ -35,15 +35,16 @@ class Drawing(Listener):
         self._parts, self._board, self._drawn_at = loop.parts, board, 0
 
     def evaluated(self, movements: int, evaluations: Mapping[str, Evaluation]) -> None:
-        """Draw the errors of an evaluation, and the competence of the regions; a run goes on without a picture."""
+        """Draw the errors of an evaluation, and the regions of the goal model; a run goes on without a picture."""
         if movements < 2 * self._drawn_at and movements != self._parts.config.movements:
             return
         self._drawn_at, robot = movements, self._parts.environment
         goals, errors = self._parts.benchmark.goals, evaluations["own"].errors
+        shown, regions = self._board.behaviour.shown, self._parts.learner.regions
         try:
             from sgimd_torch.extras.pictures.pictures import maps_of
 
-            self._board.show_pictures(maps_of(self._board.regions, robot.outcomes, robot.contexts, goals, errors))
+            self._board.show_pictures(maps_of(regions, robot.outcomes, robot.contexts, goals, errors, shown))
         except Exception as error:  # a font, a backend, a disk
             from sgimd_torch.environments.protocol import reason_of
 

@@ -9,24 +9,11 @@ from matplotlib.figure import Figure
 
 from boards import board_of, pictures_of
 from own import MODULE
-from sgimd_torch.board.curves import branches
 from sgimd_torch.extras.pictures import pictures
-from sgimd_torch.extras.pictures.sections import sections
 from sgimd_torch.runs.command import main
 from sgimd_torch.runs.program import command
 from sgimd_torch.spaces import Box, stream
-from worlds import PLANE, interest_map
-
-
-def test_the_names_of_regions_lie_where_they_are_and_are_those_of_the_curves():
-    regions = interest_map().regions
-    ax = Figure().add_subplot()
-    pictures._competence(ax, regions, *sections(PLANE))
-    named = branches(regions)
-    places = {text.get_text(): text.get_position() for text in ax.texts}
-    assert places.keys() == {path for path in named if not {f"{path}0", f"{path}1"} & named.keys()}
-    for path, (x, y) in places.items():
-        assert any((r.low <= [x, y]).all() and ([x, y] <= r.high).all() for r in named[path])
+from worlds import interest_map
 
 
 @pytest.mark.parametrize(
@@ -39,11 +26,13 @@ def test_pictures_tell_small_errors_apart_and_cut_off_no_label(high, context, wo
     regions, contexts = interest_map(space=space, context=context, worst=worst).regions, Box.cube(0, 1, len(context))
     drawn = {}
     for error in (0.01, 0.02, 0.2):
-        maps = pictures.maps_of(regions, space, contexts, goals, np.array([0.0, error, error, error]))
+        maps = pictures.maps_of(regions, space, contexts, goals, np.array([0.0, error, error, error]), [])
         drawn[error] = maps["map/error"]
         for pixels in maps.values():
             assert all((edge == 255).all() for edge in (pixels[0], pixels[-1], pixels[:, 0], pixels[:, -1]))
     half = drawn[0.01].shape[1] // 2
+    shown = pictures.maps_of(regions, space, contexts, goals, np.array([0.0, error, error, error]), [space.high * 0.5])
+    assert {tag for tag in maps if (maps[tag] != shown[tag]).any()} == {"map/error"}  # which has the demonstrations
     for less, more in ((0.01, 0.02), (0.02, 0.2)):
         assert (drawn[less] != drawn[more])[40:, :half].any()  # below the title, left of the colour bar
 
@@ -66,7 +55,7 @@ def test_pictures_are_drawn_when_the_movements_have_doubled_and_at_the_end_also_
     assert go(tmp_path / "parts", *OPTIONS, "--resume") == 0
     whole, parts = (tmp_path / name / "sgim-d/seed-003" for name in ("whole", "parts"))
     drawn = pictures_of(whole)
-    assert drawn.keys() == {"map/error", "map/competence"}
+    assert drawn.keys() == {"map/error", "map/regions", "map/interest"}
     assert all(png.startswith(b"\x89PNG") for png in drawn["map/error"].values())
     assert drawn["map/error"].keys() == {60, 120, 160}
     assert pictures_of(parts) == drawn
@@ -79,7 +68,7 @@ def test_outcomes_of_any_dimension_or_named_like_a_formula_have_pictures(own, mo
     module("formula", MODULE.replace("        self.rest", f"        {named}\n        self.rest", 1))
     words = f"--environment {robot} --algorithm sagg-riac --movements 60 --evaluate-at 30 --repeats 0 --out runs"
     assert command(main, [*words.split(), "--board", "true"]) == 0
-    assert pictures_of(Path("runs/sagg-riac/seed-000")).keys() == {"map/error", "map/competence"}
+    assert pictures_of(Path("runs/sagg-riac/seed-000")).keys() == {"map/error", "map/regions", "map/interest"}
 
 
 def test_a_picture_that_fails_ends_no_run(tmp_path, go, monkeypatch, capsys):

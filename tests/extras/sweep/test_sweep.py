@@ -216,11 +216,14 @@ def test_hyperparameters_of_a_sweep_are_what_tells_its_runs_apart_defaults_inclu
     vary = ["--vary", "algorithm=sagg-riac,practice", "--vary", "budget=1,15"]  # 1 is the default of practice
     assert command(main, [*words.split(), *vary]) == 0
     found = {path.parent.name: hparams_of(path) for path in Path("sweep").glob("*/seed-000")}
+    same = {"environment": "planar-arm-7", "seed": 0, "memory": "graph", "social": "none", "changed": "nothing"}
+    sagg = {"inverse": "process", "search": "nelder-mead", "goals": "interest-map", "explore": "anywhere"}
+    practice = {"inverse": "among-effects", "search": "vary", "goals": "within-reach", "explore": "returning"}
     assert found == {
         f"{algorithm},budget={budget}": (
-            {"algorithm": algorithm, "budget": budget, "environment": "planar-arm-7", "seed": 0},
+            {"algorithm": algorithm, "budget": budget, **same, **parts},
             ["error/mean"],
         )
-        for algorithm in ("sagg-riac", "practice")
+        for algorithm, parts in (("sagg-riac", sagg), ("practice", practice))
         for budget in (1, 15)
     }
