@@ -97,6 +97,7 @@ class BoardListener(EventFile, Listener):
 
     Attributes:
         behaviour: what the learner and its teachers did so far.
+        hparams: options of the run, as `hparams_of` has them.
         trackers: functions that get each point of the curves, too: number of movements, and values by tag.
     """
 
@@ -118,7 +119,8 @@ class BoardListener(EventFile, Listener):
         self._explained: set[str] = set()
         # The result on TensorBoard's page of hyperparameters.
         result = "error/mean" if parts.config.evaluations else "goals/missed_by"
-        names, values, _ = summary.hparams(hparams_of(parts.config), {result: math.nan})  # the third marks the end
+        self.hparams = hparams_of(parts.config)
+        names, values, _ = summary.hparams(self.hparams, {result: math.nan})  # the third marks the end
         self.add(0, names)
         self.add(0, values)
         self.add(0, summary.text("about/legend", as_markdown(self._space.unit)))

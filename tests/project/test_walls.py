@@ -43,7 +43,7 @@ LIBRARIES = {  # rooms or single files that may import a library, by library
     "mujoco": {"environments/rod_physics", "extras/models", "extras/film", "extras/teach"},
     "mujoco_menagerie": {"extras/models/file"},
     "torch": {"forward_model"},
-    "lightning": {"forward_model"},
+    "lightning": {"forward_model", "extras/logger"},
     "tensorboardX": {"board"},
     "matplotlib": {"extras/pictures", "extras/report", "extras/paper", "extras/film", "extras/demo"},
     "PIL": {"extras/film"},

@@ -28,15 +28,15 @@ class Pictures(Hook):
 
 
 class Drawing(Listener):
-    """Draws maps of T. They take as long as 100 movements, so they are drawn only when the number of movements has
-    doubled since the last ones, and at the end."""
+    """Draws maps of T. They take as long as 100 movements, so they are drawn only when there were eight times as many
+    movements as at the last ones, and at the end."""
 
     def __init__(self, loop: RunLoop, board: BoardListener) -> None:
         self._parts, self._board, self._drawn_at = loop.parts, board, 0
 
     def evaluated(self, movements: int, evaluations: Mapping[str, Evaluation]) -> None:
         """Draw the errors of an evaluation, and the regions of the goal model; a run goes on without a picture."""
-        if movements < 2 * self._drawn_at and movements != self._parts.config.movements:
+        if movements < 8 * self._drawn_at and movements != self._parts.config.movements:
             return
         self._drawn_at, robot = movements, self._parts.environment
         goals, errors = self._parts.benchmark.goals, evaluations["own"].errors

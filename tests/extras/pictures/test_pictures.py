@@ -46,18 +46,20 @@ def test_pictures_do_not_depend_on_the_matplotlibrc_of_the_user():
     assert np.array_equal(*drawn)
 
 
-OPTIONS = ("--movements", "160", "--evaluate_at", "60,120", "--board", "true")
+OPTIONS = ("--movements", "160", "--evaluate_at", "10,60,80", "--board", "true")
 
 
-def test_pictures_are_drawn_when_the_movements_have_doubled_and_at_the_end_also_after_a_resume(tmp_path, go):
+def test_pictures_are_drawn_when_there_were_eight_times_as_many_movements_and_at_the_end_also_after_a_resume(
+    tmp_path, go
+):
     assert go(tmp_path / "whole", *OPTIONS) == 0
-    assert go(tmp_path / "parts", "--movements", "100", "--evaluate_at", "60") == 0
+    assert go(tmp_path / "parts", "--movements", "100", "--evaluate_at", "10,60") == 0
     assert go(tmp_path / "parts", *OPTIONS, "--resume") == 0
     whole, parts = (tmp_path / name / "sgim-d/seed-003" for name in ("whole", "parts"))
     drawn = pictures_of(whole)
     assert drawn.keys() == {"map/error", "map/regions", "map/interest"}
     assert all(png.startswith(b"\x89PNG") for png in drawn["map/error"].values())
-    assert drawn["map/error"].keys() == {60, 120, 160}
+    assert drawn["map/error"].keys() == {10, 80, 160}
     assert pictures_of(parts) == drawn
     assert all(board_of(whole).SummaryMetadata(tag).summary_description for tag in drawn)
 
@@ -77,4 +79,4 @@ def test_a_picture_that_fails_ends_no_run(tmp_path, go, monkeypatch, capsys):
 
     monkeypatch.setattr(pictures, "maps_of", no_font)
     assert go(tmp_path, *OPTIONS) == 0
-    assert "the board has no pictures after 60 movements: OSError: no font" in capsys.readouterr().err
+    assert "the board has no pictures after 10 movements: OSError: no font" in capsys.readouterr().err
