@@ -142,7 +142,6 @@ def evaluation_curves(evaluation: Evaluation, near: float) -> dict[str, float]:
         "error/mean": evaluation.mean_error,
         "error/median": float(np.median(evaluation.errors)),
         "error/p90": float(np.quantile(evaluation.errors, 0.9)),
-        "error/noise_floor": evaluation.noise_floor,
         **({"error/failed": float(evaluation.failed.sum())} if evaluation.failed.any() else {}),
         "goals/met": float((evaluation.errors <= near).mean()),
     }

@@ -12,7 +12,6 @@ LEGEND: Final[Mapping[str, str]] = {
     "error/median": "Median distance UNIT from a benchmark goal to the outcome of the movement for it.",
     "error/p90": "90th percentile of the distance UNIT from a benchmark goal to the outcome of the movement for it.",
     "error/failed": "Number of movements of the evaluation that failed. A failed movement counts as rest.",
-    "error/noise_floor": "Part UNIT of error/mean that motor noise alone makes.",
     "error": "Mean error UNIT with the inverse model that the tag names, in place of the learner's own, if "
     "--evaluated-by adds one. It compares what the learners remember, whatever their inverse models are.",
     "competence": "Mean competence of the answers of an evaluation, eq. (7), by tile of T and over all goals: 0 is "

@@ -96,7 +96,7 @@ class BoardListener(EventFile, Listener):
         curves: function that returns the new numbers of other listeners for the board, by tag.
 
     Attributes:
-        behaviour: what the learner and its teachers did so far.
+        behaviour: counts of movements, goals and demonstrations so far.
         hparams: options of the run, as `hparams_of` has them.
         trackers: functions that get each point of the curves, too: number of movements, and values by tag.
     """

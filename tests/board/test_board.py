@@ -121,7 +121,7 @@ def test_a_tile_has_the_mean_competence_of_its_goals_and_the_name_of_its_place()
 def test_the_share_of_goals_met_is_counted():
     values = evaluation_curves(evaluation([0.01, 0.2, 0.05, 0.0]), 0.05)
     assert values["goals/met"] == 0.75
-    assert (values["error/mean"], values["error/noise_floor"]) == pytest.approx((0.065, 0.01))
+    assert values["error/mean"] == pytest.approx(0.065)
 
 
 def test_earlier_event_files_stay_until_the_replay_is_over(tmp_path):
@@ -190,9 +190,8 @@ def watched(tmp_path_factory, go):
 
 def test_the_curves_of_a_run_are_those_of_its_record(watched):
     curves, read = curves_of(watched), read_run(watched)
-    for tag, column in {"mean": "mean_error", "p90": "p90_error", "noise_floor": "noise_floor"}.items():
+    for tag, column in {"mean": "mean_error", "p90": "p90_error"}.items():
         expected = dict(zip(read.evaluation["movements"], read.evaluation[column], strict=True))
-        expected = {step: value for step, value in expected.items() if np.isfinite(value)}  # the floor: at the end only
         assert curves[f"error/{tag}"] == pytest.approx(expected, rel=1e-6)
     shares = read.evaluation["goals_met"] / len(read.benchmark)
     assert curves["goals/met"] == pytest.approx(dict(zip(read.evaluation["movements"], shares, strict=True)))
