@@ -17,7 +17,7 @@ class Logging(Hook):
     """Curves for another tracker.
 
     Args:
-        logger: tracker that gets the curves of the board, too: csv, wandb (offline) or mlflow; null: none.
+        logger: other tracker of the curves: csv, wandb or mlflow; null: none.
     """
 
     may_change: ClassVar = ("logger",)
