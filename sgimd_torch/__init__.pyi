@@ -33,8 +33,11 @@ from .memory import Memory as Memory
 from .parts import Explore as Explore
 from .parts import Goals as Goals
 from .parts import Inverse as Inverse
+from .parts import Judge as Judge
 from .parts import Problem as Problem
 from .parts import Search as Search
+from .parts import Social as Social
+from .parts import Strategy as Strategy
 from .parts import Teacher as Teacher
 from .record.replay import load_life as load_life
 from .record.replay import save_life as save_life

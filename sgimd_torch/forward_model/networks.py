@@ -11,11 +11,12 @@ from __future__ import annotations
 import copy
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import Any, ClassVar, Final, NamedTuple
 
 import torch
+from torch.func import functional_call, stack_module_state
 
 from sgimd_torch.calls import call_checked, function_of
 from sgimd_torch.spaces import check_count
@@ -111,6 +112,9 @@ class Perceptrons(torch.nn.Module):
 class OwnNetworks(torch.nn.Module):
     """Networks of a user, one for each member; other scales have to be learnt.
 
+    Members of one class are computed at once, by ``torch.vmap``: ``stacked`` has the weights of all, with a first axis
+    more. ``one_by_one`` says why this is not possible; it is "" where it is.
+
     Args:
         make: function or class that makes a network from ``dims``, or a network, which is copied with its weights.
         dims: dimensions of context, theta and outcome.
@@ -131,34 +135,93 @@ class OwnNetworks(torch.nn.Module):
         noise_heads: bool,
     ) -> None:
         super().__init__()
-        self.context_dim, self.noise_heads = dims[0], noise_heads
+        self.context_dim, self.noise_heads, self.n = dims[0], noise_heads, members
         made = []
         for seed in torch.randint(2**62, (members,), generator=generator).tolist():
             with torch.random.fork_rng(devices=[]):
                 torch.default_generator.manual_seed(seed)
                 made.append(network_of(make, dims))
-        self.members = torch.nn.ModuleList(made)
+        self.one_by_one = why_one_by_one(made, dims)
+        self.networks = torch.nn.ModuleList(made if self.one_by_one else [stacked(made)])
         self.standardised = not isinstance(made[0], Network) or made[0].standardised
         self.log_variance = torch.nn.Parameter(torch.zeros(members, 1, dims[2]))  # of networks without noise heads
+
+    @property
+    def members(self) -> list[torch.nn.Module]:
+        """The networks; those that are computed at once are copied."""
+        if self.one_by_one:
+            return list(self.networks)
+        copies = [copy.deepcopy(self.networks[0]) for _ in range(self.n)]
+        for member, network in enumerate(copies):
+            for values in state_of(network).values():
+                values.data = values.data[member]
+        return copies
 
     def forward(self, x: torch.Tensor, scales: Scales) -> Output:
         """Mean and log variance ``(members, n, outcome_dim)`` for standardised ``(members, n, n_inputs)``."""
         if not self.standardised:
             x = scales.input_mean + scales.input_spread * x
-        c = self.context_dim
-        answers = [network(one[:, :c], one[:, c:]) for network, one in zip(self.members, x, strict=True)]
-        pairs = [answer if isinstance(answer, tuple) else (answer, None) for answer in answers]
-        mean = torch.stack([mean for mean, _ in pairs])
-        own = [log_variance for _, log_variance in pairs if log_variance is not None]
+        inputs = x[..., : self.context_dim], x[..., self.context_dim :]
+        answer = each(self.networks, *inputs) if self.one_by_one else at_once(self.networks[0], *inputs)
+        mean, log_variance = answer if isinstance(answer, tuple) else (answer, None)
         if not self.standardised:
             mean = (mean - scales.outcome_mean) / scales.outcome_spread
-        if not own or not self.noise_heads:
+        if log_variance is None or not self.noise_heads:
             return mean, self.log_variance.expand_as(mean)
-        log_variance = torch.stack(own)
         return mean, log_variance if self.standardised else log_variance - 2 * scales.outcome_spread.log()
 
     def rescale(self, old: Scales, new: Scales) -> None:
         """Change nothing."""
+
+
+def state_of(network: torch.nn.Module) -> dict[str, torch.Tensor]:
+    """Parameters and buffers by name."""
+    return {**dict(network.named_parameters()), **dict(network.named_buffers())}
+
+
+def stacked(networks: Sequence[torch.nn.Module]) -> torch.nn.Module:
+    """A module with parameters and buffers of all ``networks``, along a first axis."""
+    whole, (weights, buffers) = copy.deepcopy(networks[0]), stack_module_state(list(networks))
+    for name, values in state_of(whole).items():
+        values.data = {**weights, **buffers}[name].data
+    return whole
+
+
+def at_once(whole: torch.nn.Module, context: torch.Tensor, theta: torch.Tensor) -> torch.Tensor | Output:
+    """Answers of the networks in ``whole``, which are `stacked`, each for its own ``(n, ...)`` inputs."""
+
+    def one(state: dict[str, torch.Tensor], *inputs: torch.Tensor) -> Any:
+        return functional_call(whole, state, inputs)
+
+    answer: torch.Tensor | Output = torch.vmap(one, randomness="different")(state_of(whole), context, theta)
+    return answer
+
+
+def each(networks: Iterable[torch.nn.Module], context: torch.Tensor, theta: torch.Tensor) -> torch.Tensor | Output:
+    """Answers of ``networks``, one after the other, each for its own ``(n, ...)`` inputs."""
+    answers = [network(*inputs) for network, *inputs in zip(networks, context, theta, strict=True)]
+    if isinstance(answers[0], tuple):
+        mean, log_variance = map(torch.stack, zip(*answers, strict=True))
+        return mean, log_variance
+    return torch.stack(answers)
+
+
+def why_one_by_one(networks: Sequence[torch.nn.Module], dims: tuple[int, int, int]) -> str:
+    """Why ``networks`` cannot be computed at once, as a trial shows; "": they can."""
+    ones, generator = copy.deepcopy(list(networks)), torch.Generator().manual_seed(0)
+    inputs = [torch.rand(len(ones), _TRIED, dim, generator=generator) for dim in dims[:2]]
+    with torch.random.fork_rng(devices=[]), torch.no_grad():
+        try:
+            whole = stacked(ones)
+            for module in (*ones, whole):
+                module.train()
+            at_once(whole, *inputs), each(ones, *inputs)  # what they remember of training must be the same, too
+            for module in (*ones, whole):
+                module.eval()
+            torch.testing.assert_close(at_once(whole, *inputs), each(ones, *inputs), rtol=1e-3, atol=1e-4)
+        except Exception as error:  # vmap and a user's module may raise anything
+            return f"{type(error).__name__}: {str(error).strip().partition(chr(10))[0]}"
+    return ""
 
 
 def network_of(make: Callable[..., Any], dims: tuple[int, int, int]) -> torch.nn.Module:

@@ -42,6 +42,8 @@ class SharedModel(Trained):
     def __init__(self, problem: Problem, **options: Any) -> None:
         self.model = ForwardModel(*problem.dims, seed=problem.seed, **options)
         self.device = self.model.trained_on
+        if why := getattr(self.model.networks, "one_by_one", ""):
+            problem.remarks.append(f"the members of the forward model are computed one by one, which is slower: {why}")
 
     def refresh(self, memory: Memory) -> Refresh | None:
         """Result of `ForwardModel.refresh`."""

@@ -2,6 +2,7 @@
 
 import copy
 import math
+import re
 import threading
 from functools import partial
 
@@ -14,8 +15,12 @@ from torch.utils.data import DataLoader, TensorDataset
 
 from sgimd_torch.forward_model.model import ForwardModel
 from sgimd_torch.forward_model.networks import Network, nll
+from sgimd_torch.forward_model.shared import model_of
+from sgimd_torch.inverses.nearest import NearestNeighbour as Nearest
 from sgimd_torch.memory import Memory
-from sgimd_torch.spaces import stream
+from sgimd_torch.parts import Problem
+from sgimd_torch.spaces import Box, stream
+from worlds import Boxes
 
 MEMBERS = 3
 
@@ -189,6 +194,50 @@ def test_own_networks_learn_standardised_or_in_units_with_a_noise_or_without(kin
         answers = [net(model.tensor(memory.contexts), model.tensor(memory.thetas)) for net in model.networks.members]
         means = [(answer[0] if heads else answer).detach() for answer in answers]
         np.testing.assert_allclose(torch.stack(means).mean(dim=0), mean, atol=1e-5)
+
+
+class Normed(Own):
+    """With statistics of training, and members that differ in a number which is no weight."""
+
+    def __init__(self, *dims, step: float = 0.0):
+        super().__init__(*dims)
+        self.norm, self.factor = torch.nn.BatchNorm1d(dims[1]), 1 + step * float(torch.rand(()))
+
+    def forward(self, context, theta):
+        return super().forward(self.factor * context, self.norm(theta))
+
+
+class Asking(Own):
+    def forward(self, context, theta):
+        return super().forward(context, theta if theta.mean() > -1e9 else -theta)
+
+
+@pytest.mark.parametrize(
+    ("network", "why"),
+    [
+        (Own, ""),
+        (InUnits, ""),
+        (Normed, ""),
+        (Asking, "RuntimeError: vmap: .*data-dependent control flow"),
+        (partial(Normed, step=1.0), "AssertionError: "),
+    ],
+)
+def test_own_networks_are_computed_at_once_and_answer_as_each_alone_or_it_says_why_not(network, why, monkeypatch):
+    model = ensemble(network=network)
+    assert re.match(why or "$", model.networks.one_by_one)
+    model.refresh(moved())
+    calls, call = [], torch.nn.Linear.forward
+    monkeypatch.setattr(torch.nn.Linear, "forward", lambda layer, x: calls.append(layer) or call(layer, x))
+    context, theta = random(6, 1), random(6, 3)
+    means, _ = model.landing(context, theta)
+    assert len(calls) == (MEMBERS if why else 1)
+    inputs = (torch.cat([context, theta], dim=-1) - model.input_mean) / model.input_scale
+    if network is not InUnits:
+        alone = torch.stack([net(inputs[:, :1], inputs[:, 1:])[0] for net in model.networks.members])
+        torch.testing.assert_close(means, model.outcome_mean + model.outcome_scale * alone)
+    problem = Problem(Boxes(Box.cube(0, 1, 1), Box.cube(0, 1, 3), Box.cube(0, 9, 2), np.zeros(2)), 0, inverse=Nearest)
+    model_of(problem, network=network)
+    assert len(problem.remarks) == bool(why)
 
 
 def test_a_module_is_copied_with_its_weights():
