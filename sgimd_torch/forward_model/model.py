@@ -1,14 +1,15 @@
 """Forward model L, which predicts the outcome of a movement: an ensemble of networks, trained while the robot learns.
 
 Not in Nguyen & Oudeyer (2014), who use local models only. `OnlineTrainer` trains the networks. `ForwardModel` is a
-LightningModule, which any loop of Lightning can train and ``load_from_checkpoint`` can load.
+LightningModule, which any loop of Lightning can train and ``load_from_checkpoint`` can load. A class derived from it
+has its own optimiser, scheduler, loss and callbacks, by the methods of a LightningModule.
     model = ForwardModel(0, 25, 2, seed=3); model.refresh(memory); model.predict(contexts, thetas).mean
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -85,6 +86,7 @@ class ForwardModel(LightningModule):
         noise_heads: true: the predicted noise depends on the movement; false: all movements have the same noise.
         accelerator: device for training: auto (the CPU, the fastest for these sizes), cpu, cuda or mps.
         trust: relative error above which the forward model is not used.
+        loggers: loggers of Lightning, to which ``log`` writes during a refresh.
 
     Attributes:
         before_learning: functions that test the model on new exemplars. Each refresh calls them first, with the memory
@@ -124,9 +126,12 @@ class ForwardModel(LightningModule):
         noise_heads: bool = True,
         accelerator: str = "auto",
         trust: float = TRUSTED_UP_TO,
+        loggers: Sequence[Any] = (),
     ) -> None:
         super().__init__()
-        self.save_hyperparameters(ignore=["network", "accelerator"])  # a device is chosen when a model is loaded
+        self.save_hyperparameters(
+            ignore=["network", "accelerator", "loggers"]
+        )  # a device is chosen when a model is loaded
         dims = context_dim, theta_dim, outcome_dim
         self.sizes = dict(zip(("context_dim", "theta_dim", "outcome_dim"), dims, strict=True))
         for name, count in {**self.sizes, "members": members, "every": every, "batch": batch}.items():
@@ -151,7 +156,7 @@ class ForwardModel(LightningModule):
         else:
             self.networks = OwnNetworks(network, dims, members, generator, noise_heads)
             self.hparams["network"] = described(network)
-        self._online = OnlineTrainer(self, generator, members, every, batch, accelerator)
+        self._online = OnlineTrainer(self, generator, members, every, batch, accelerator, loggers)
         for name, dim in {"input": context_dim + theta_dim, "outcome": outcome_dim}.items():
             self.register_buffer(f"{name}_mean", torch.zeros(dim))
             self.register_buffer(f"{name}_scale", torch.ones(dim))

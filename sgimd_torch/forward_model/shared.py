@@ -6,7 +6,7 @@ A replay writes the tables of the record again, except rows that come before a c
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import islice
 from pathlib import Path
@@ -15,7 +15,7 @@ from typing import Any, Final
 import numpy as np
 from scipy.special import gammaincinv
 
-from sgimd_torch.calls import with_keywords_of
+from sgimd_torch.calls import call_checked, function_of, with_keywords_of
 from sgimd_torch.forward_model.checkpoints import read_checkpoint, write_checkpoint
 from sgimd_torch.forward_model.model import ForwardModel, Refresh
 from sgimd_torch.memory import Memory
@@ -36,11 +36,18 @@ class SharedModel(Trained):
 
     Args:
         problem: problem to learn, with the dimensions and the seed of the model.
+        module: constructor of the model.
         options: options of `ForwardModel`.
+
+    Raises:
+        ValueError: ``module`` makes no `ForwardModel`.
     """
 
-    def __init__(self, problem: Problem, **options: Any) -> None:
-        self.model = ForwardModel(*problem.dims, seed=problem.seed, **options)
+    def __init__(self, problem: Problem, module: Callable[..., ForwardModel], **options: Any) -> None:
+        what = f"module {function_of(module).__name__}"
+        self.model = call_checked(what, module, *problem.dims, seed=problem.seed, **options)
+        if not isinstance(self.model, ForwardModel):
+            raise ValueError(f"{what} must make a ForwardModel, made a {type(self.model).__name__}")
         self.device = self.model.trained_on
         if why := getattr(self.model.networks, "one_by_one", ""):
             problem.remarks.append(f"the members of the forward model are computed one by one, which is slower: {why}")
@@ -82,9 +89,9 @@ _OPTIONS: Final = ("members", "network", "widths", "activation", "lr", "beta", "
 
 
 @with_keywords_of(ForwardModel, *_OPTIONS, "accelerator", "trust")
-def model_of(problem: Problem, **options: Any) -> ForwardModel:
-    """The forward model of a problem; the first call makes it, with these options."""
-    return problem.shared(SharedModel, partial(SharedModel, problem, **options)).model
+def model_of(problem: Problem, *, module: Callable[..., ForwardModel] = ForwardModel, **options: Any) -> ForwardModel:
+    """The forward model of a problem; the first call makes it, by ``module``, with these options."""
+    return problem.shared(SharedModel, partial(SharedModel, problem, module, **options)).model
 
 
 class ModelBased(Inverse):
