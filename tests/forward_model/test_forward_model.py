@@ -174,7 +174,7 @@ def test_after_a_divergence_the_weights_before_it_are_back(lr):
     assert model.refresh(remembered(400)).fit.diverged
     assert torch.equal(weights(model), before)
     assert model.relative_error == pytest.approx(error, rel=0.2)  # of more exemplars held out
-    model.lr = usual
+    model.lr, model._online.optimizer = usual, None
     assert not model.refresh(remembered(500)).fit.diverged
 
 
