@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib import rc_context
-from matplotlib.figure import Figure
 
 from boards import board_of, pictures_of
 from own import MODULE
