@@ -186,7 +186,7 @@ def memory_for(memory: Memory | MakeMemory, dims: tuple[int, int, int]) -> Memor
     """A memory for a learner with these dimensions: a new one, or a copy of a ``memory`` to start from.
 
     Raises:
-        ValueError: the memory has other dimensions, or a memory of a user's does not find the nearest rows.
+        ValueError: the memory has other dimensions, or one of a user's does not find the nearest rows.
     """
     if not isinstance(memory, Memory):
         memory = memory(*dims)
@@ -196,7 +196,7 @@ def memory_for(memory: Memory | MakeMemory, dims: tuple[int, int, int]) -> Memor
     if own != dims:
         raise ValueError(f"a memory to start from must have dims {dims} of context, theta, outcome, got {own}")
     if type(memory) not in (Memory, FlatMemory, ScanMemory):
-        from sgimd_torch.memory.trial import check_memory  # for a memory of a user's alone
+        from sgimd_torch.memory.trial import check_memory  # few users bring a memory
 
         check_memory(memory)
     return memory.copy()

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from sgimd_torch.memory import Memory
 from sgimd_torch.memory.growing import Growing
 from sgimd_torch.spaces import stream
+
+if TYPE_CHECKING:
+    from sgimd_torch.memory import Memory
 
 _N: Final = 40  # number of exemplars in the trial
 _ASKED: Final = 10  # number of neighbours that are asked for

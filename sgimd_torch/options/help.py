@@ -39,7 +39,7 @@ def overview(description: str | None) -> str:
         _line("--resume", "flag: go on with a stopped or killed run, or lengthen a finished one"),
         "names for --algorithm:",
         *(_line(word, about("algorithm", word)) for word in installs if not installs[word]),
-        *(_line(f"with [{extra}]", ", ".join(words)) for extra, words in extras.items()),
+        *(_line(f"with [{extra}]", " ".join(words)) for extra, words in extras.items()),
         "names for the parts of a run; for a part of your own, type package.module:attribute:",
         *(_line(f"--{option}", ", ".join(words)) for option, words in parts.items()),
         "Parts have options, too, such as --goals.window 12; to see them: sgimd run --goals interest-map --help",

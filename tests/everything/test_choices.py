@@ -28,6 +28,7 @@ def test_every_choice_runs_and_differs_from_the_others(tmp_path, go, kind, table
     common = ["--evaluate_at", "[]", "--environment", "planar-arm-7", "--benchmark", "null"]
     common += ["--movements", 240 if kind in ("goals", "progress", "judge") else 120]
     common += ["--algorithm", "sgim-im"] if kind == "teachers" else ["--budget", 3]
+    common += ["--algorithm", "sagg-riac"] if kind == "judge" else []
     common += ["--teacher.every", 20] if kind == "choose" else []
     common += ["--goals.window", 4] if kind == "progress" else []
     common += ["--environment", "fishing-rod"] if kind in ("teachers", "judge") else []

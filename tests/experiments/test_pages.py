@@ -141,11 +141,11 @@ def test_the_page_of_searches_has_errors_over_those_of_the_simplex_and_the_cost_
 def test_searches_side_by_side_have_the_lives_that_each_has_alone(monkeypatch):
     monkeypatch.setattr(refinement, "WARM", 1)
     ticks = count()  # every movement takes as long, so equal time is equal movements
-    rows = refinement.life(ROBOT, 3, movements=120, clock=lambda: next(ticks))
-    alone = refinement.TimedLife({**refinement.ROBOTS[ROBOT], "search": "gradient", "seed": 3}, 120, lambda: 0)
-    for _ in range(120):
+    rows = refinement.life(ROBOT, 3, movements=200, clock=lambda: next(ticks))
+    alone = refinement.TimedLife({**refinement.ROBOTS[ROBOT], "search": "gradient", "seed": 3}, 200, lambda: 0)
+    for _ in range(200):
         alone.move()
-    assert rows["gradient"] == (120, 120, alone.now()[2], 119, 119, rows["gradient"][-1])
-    assert [row[:2] for row in rows.values()] == [(120, 120)] * 2
-    assert [row[3:5] for row in rows.values()] == [(120, 120), (119, 119)]
+    assert rows["gradient"] == (200, 200, alone.now()[2], 199, 199, rows["gradient"][-1])
+    assert [row[:2] for row in rows.values()] == [(200, 200)] * 2
+    assert [row[3:5] for row in rows.values()] == [(200, 200), (199, 199)]
     assert len({row[2] for row in rows.values()}) == 2

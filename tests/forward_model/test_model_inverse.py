@@ -130,7 +130,7 @@ def test_alone_it_learns_by_the_locally_linear_answer_and_is_evaluated_by_the_mo
 @pytest.mark.parametrize("kind", [ModelInverse, ModelAlone, ProvedModel])
 def test_the_options_of_the_model_are_options_of_the_inverse_and_explained(kind):
     defaults = inspect.signature(ForwardModel).parameters
-    names = defaults.keys() - {"context_dim", "theta_dim", "outcome_dim", "seed", "every"}
+    names = defaults.keys() - {"context_dim", "theta_dim", "outcome_dim", "seed", "every", "loggers"}
     assert {name: option.default for name, option in options_of(kind).items()} == {
         name: defaults[name].default for name in names
     }
@@ -170,7 +170,7 @@ def noisy(theta, rng):
 
 @pytest.fixture(scope="module")
 def proved():
-    return lived(noisy, 600)
+    return lived(noisy, 1000)
 
 
 @pytest.mark.parametrize("trusted", [False, True])
@@ -189,17 +189,17 @@ def test_the_model_answers_if_it_predicts_as_well_as_the_process(proved, trusted
 def test_it_wants_enough_tests_and_better_predictions_where_nothing_is_noisy(proved):
     assert proved.trusted
     assert not lived(noisy, 150).trusted
-    assert not lived(noisy, 600, noise=0.0).trusted
+    assert not lived(noisy, 1000, noise=0.0).trusted
 
 
 def test_answers_do_not_change_what_is_proved(proved, goals):
-    asked = lived(noisy, 600, asked=goals)
+    asked = lived(noisy, 1000, asked=goals)
     assert asked.trusted == proved.trusted
     np.testing.assert_array_equal(answers(asked, goals), answers(proved, goals))
 
 
 def test_in_thousandths_of_the_unit_it_trusts_and_answers_the_same(proved):
-    thousand = lived(noisy, 600, scale=1000.0)
+    thousand = lived(noisy, 1000, scale=1000.0)
     assert thousand.trusted == proved.trusted
     goals = stream(6, "goals").uniform(-0.9, 0.9, (20, 2))
     np.testing.assert_allclose(answers(proved, goals), answers(thousand, 1000.0 * goals), atol=5e-3)  # float32

@@ -334,7 +334,7 @@ def test_a_divergence_is_told_and_recorded(listen, capsys):
         if index == 99:
             model.lr, model._online.optimizer = 1e30, None
         if index == 149:
-            model.lr = 1e-2
+            model.lr, model._online.optimizer = 1e-2, None
 
     record, _, curves = listen(150, spoil)
     assert [index for index, numbers in enumerate(curves) if numbers] == [49, 99, 149]

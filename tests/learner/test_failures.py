@@ -212,16 +212,16 @@ def test_a_run_whose_robot_is_broken_says_how_to_go_on_and_does(robots: Path, ca
 
 
 def test_each_process_tells_three_failures_and_only_counts_later_ones_also_in_evaluations(robots: Path, capsys) -> None:
-    assert command(main, words("worse", "--evaluate-at", "20", "--movements", "20")) == 0
+    assert command(main, words("worse", "--evaluate-at", "20", "--movements", "20")) == 1
     printed = capsys.readouterr()
-    assert "movements of the evaluation failed" in printed.out
+    assert "movements of the evaluation failed" in printed.err
     assert read_run(robots / "worse" / "practice" / "seed-003").summary["failed"] == 11
     told = [line for line in printed.err.splitlines() if "movement " in line]
     numbers = ("1 failed: ConnectionError: lost packet 2", "3", "5")
     assert len(told) == 3
     assert all(f"movement {each}" in line for line, each in zip(told, numbers, strict=True))
     assert "further failures are only counted" in told[2]
-    assert command(main, words("worse", "--evaluate-at", "20", "--movements", "24", "--resume")) == 0
+    assert command(main, words("worse", "--evaluate-at", "20", "--movements", "24", "--resume")) == 1
     assert "movement 21 failed: ConnectionError: lost packet 2" in capsys.readouterr().err
 
 

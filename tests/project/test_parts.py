@@ -36,6 +36,8 @@ FIELDS = {  # files and definitions that may look up members by name, because th
     ("goals/regions", "Region"): "hands out its own arrays read-only",
     ("record/replay", "_check_lesson"): "compares two demonstrations field by field",
     ("forward_model/model", "ForwardModel"): "compares its sizes with those of a memory",
+    ("forward_model/shared", "SharedModel"): "networks of one's own may say why they are computed one by one",
+    ("forward_model/training", "OnlineTrainer"): "calls the hooks of Lightning by name",
 }
 SIGNATURES = {"signature", "Signature", "getfullargspec", "parameters_of", "__code__", "__defaults__", "__kwdefaults__"}
 OPTIONS = {  # files and definitions that may read the parameters of a function; why

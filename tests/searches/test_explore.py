@@ -46,7 +46,8 @@ def test_movements_lie_between_the_middle_and_a_uniform_one(uniform):
     sizes = np.abs(2 * (thetas - POLICIES.low) / POLICIES.sides - 1).max(axis=1)  # 0: the middle, 1: the border
     assert thetas.mean(axis=0) == pytest.approx([1.0, 5.0], abs=0.2)
     draws = np.random.default_rng(0).random((4000, 3)) ** [1, 0.5, 1]  # .5: the largest of two uniform numbers
-    expected = draws[:, 1] * np.where(draws[:, 2] < uniform, 1, draws[:, 0])
+    far = draws[:, 0] ** (POLICIES.dim / 25)
+    expected = draws[:, 1] * np.where(draws[:, 2] < uniform, 1, far)
     for share in (0.25, 0.5, 0.75):
         assert np.quantile(sizes, share) == pytest.approx(np.quantile(expected, share), abs=0.03)
 

@@ -41,7 +41,7 @@ def test_pictures_do_not_depend_on_the_matplotlibrc_of_the_user():
     drawn = []
     for settings in ({}, {"text.usetex": True, "font.size": 30}):  # there need be no LaTeX
         with rc_context(settings):
-            drawn.append(pictures.maps_of([], space, Box.cube(0, 1, 0), goals, goals[:, 0])["map/error"])
+            drawn.append(pictures.maps_of([], space, Box.cube(0, 1, 0), goals, goals[:, 0], [])["map/error"])
     assert np.array_equal(*drawn)
 
 
