@@ -6,6 +6,7 @@ and their ratio. Times are processor times unless a clock is named; other progra
   learning  a learner's time for a movement, without the robot's, after 250 to 20,000 movements of a life: the mean of
             the fastest 90 of the next 100; its ratio to the rod's physics in the same process; and the ratio in the
             mean of the whole life so far, fits of the local process included
+  memory    a query for ten neighbours over faiss's plain flat search, and its recall; for more rows type --movements
   at-once   movements a second by the clock, with several robots at once (here alone)
   run       `sgimd run` of practice on the fishing rod, and the times of its parts by the clock
 
@@ -118,6 +119,36 @@ def live(name: str, movements: int) -> Figures:
     return figures
 
 
+def memory(most: int) -> Figures:
+    """Time of a query over that of faiss's flat search, and recall of ten neighbours among ``most`` rows."""
+    import faiss
+
+    from sgimd_torch.memory.growing import Growing
+    from sgimd_torch.memory.neighbours import Flat, Graph
+    from sgimd_torch.spaces import stream
+
+    figures: Figures = {}
+    for dim, kind in product((2, 25, 50), ("uniform", "clustered")):
+        rng = stream(dim, kind)
+        centres = rng.random((most // 1000 + 10, dim)) if kind == "clustered" else np.zeros((1, dim))
+        spread = rng.normal(0, 0.02, (most, dim)) if kind == "clustered" else rng.random((most, dim))
+        rows = centres[rng.integers(len(centres), size=most)] + spread
+        for n in sorted({500, 5000, most}):
+            side, exact, index = Graph(Growing(dim, rows[:n])), Flat(Growing(dim, rows[:n])), faiss.IndexFlatL2(dim)
+            index.add(rows[:n].astype(np.float32))
+            queries = rows[rng.integers(n, size=100)] + rng.normal(0, 0.01, (100, dim))
+            singles = queries.astype(np.float32)
+            side.nearest(queries[:1], 10)  # the index is built
+            ours = seconds(partial(list, map(partial(side.nearest, k=10), queries[:, None])))
+            plain = seconds(partial(list, map(partial(index.search, k=10), singles[:, None])))
+            where = f"{n} {kind} rows of {dim}"
+            figures[f"{where} (ms)"], figures[f"{where}, over plain"] = 10 * ours, ours / plain
+            if n == most:
+                pairs = zip(side.nearest(queries, 10), exact.nearest(queries, 10), strict=True)
+                figures[f"{where}, recall"] = float(np.mean([np.isin(one, other).mean() for one, other in pairs]))
+    return figures
+
+
 def at_once(movements: int) -> Figures:
     """Movements a second by the clock, with several robots at once."""
     from sgimd_torch import FishingRod, practice, run
@@ -182,6 +213,7 @@ def show(name: str, several: list[list[float]]) -> None:
 
 PARTS: dict[str, tuple[list[Measurement], int]] = {  # measurements by name of the part, and their number of movements
     "learning": ([partial(in_child, name) for name in LIVES], 100),
+    "memory": ([partial(in_child, "memory")], 100_000),
     "at-once": ([partial(in_child, "at-once")], 400),
     "run": ([whole_run], 2000),
 }
@@ -194,10 +226,10 @@ def main() -> int:
     parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS), metavar="PART", help=", ".join(PARTS))
     parser.add_argument("--rounds", type=PositiveInt, default=3, help="repetitions of each figure (default: 3)")
     parser.add_argument("--movements", type=PositiveInt, help="number of movements of each run (default: by part)")
-    parser.add_argument("--child", choices=[*LIVES, "at-once"], help=argparse.SUPPRESS)
+    parser.add_argument("--child", choices=[*LIVES, "memory", "at-once"], help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.child:
-        measured = at_once if options.child == "at-once" else partial(live, options.child)
+        measured = {"at-once": at_once, "memory": memory}.get(options.child, partial(live, options.child))
         print(json.dumps(measured(options.movements)))
         return 0
     with TemporaryDirectory() as folder:
@@ -215,7 +247,10 @@ def main() -> int:
         print(f"{'':56}" + "".join(f"{name:>12}" for name in ("here", "there", "here/there")[: 2 * len(libraries) - 1]))
         work = [(part, measure) for part in options.only for measure in PARTS[part][0]]
         for part, measure in tqdm(work, leave=False, disable=None):
-            movements, compared = options.movements or PARTS[part][1], libraries[: 1 if part == "at-once" else 2]
+            movements, compared = (
+                options.movements or PARTS[part][1],
+                libraries[: 1 if part in ("at-once", "memory") else 2],
+            )
             rounds = [[measure(library, movements) for library in compared] for _ in range(options.rounds)]
             for name in rounds[0][0]:
                 show(name, [[figures[name] for figures in several] for several in zip(*rounds, strict=True)])

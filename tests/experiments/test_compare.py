@@ -271,6 +271,7 @@ def test_rows_made_again_are_equal_but_for_rounding_or_differ():
         assert compared(shipped_row, now) == "DIFFERS"
 
 
+@pytest.mark.slow
 def test_rows_are_drawn_by_lot_and_made_again_in_a_folder_of_their_own(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     config = Config(algorithm="sgim-d", name="sgim-d.planar-arm-7", movements=20, parts={"environment": "planar-arm-7"})

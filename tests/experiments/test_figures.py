@@ -31,6 +31,7 @@ def draw(*options):
     return command(main, list(map(str, options)))
 
 
+@pytest.mark.slow
 def test_every_figure_is_written_whole_and_twice_the_same(folder, tmp_path, capsys):
     for out in ("a", "b"):
         assert draw("--results", folder, "--out", tmp_path / out) == 0

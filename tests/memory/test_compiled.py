@@ -48,6 +48,7 @@ def started(package: Path, program: str = PROGRAM, **variables: str) -> subproce
     )
 
 
+@pytest.mark.slow
 def test_two_processes_compile_at_once_for_a_third_though_the_package_cannot_be_written_to(package, tmp_path):
     variables = {"XDG_CACHE_HOME": str(tmp_path / "cache"), "HOME": str(tmp_path / "home")}
     both = [started(package, **variables) for _ in range(2)]

@@ -86,6 +86,7 @@ def setup(tmp_path):
 DEMO, ALL = ".[plot,report]", ".[all,dev]"  # what setup gives to pip
 
 
+@pytest.mark.slow
 def test_setup_installs_what_is_missing_and_everything_serves_the_demo(setup):
     assert setup("demo") == setup("demo") == ["venv", DEMO]
     assert setup("") == setup("demo") == setup("") == ["venv", DEMO, ALL]

@@ -85,6 +85,7 @@ UNJUDGED = ["--evaluate-at", "[]", "--benchmark", "null"]
 RUN = ["--algorithm", "practice", "--at-once", "4", "--environment"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("robot", "at_once"),
     [("planar-arm-7", 4), ("robots_at_once:Odd", 2), pytest.param("experiments.toys:toss", 2, marks=pytest.mark.slow)],

@@ -167,6 +167,7 @@ def begun(odd, tmp_path, monkeypatch):
     return begun
 
 
+@pytest.mark.slow
 def test_a_run_that_is_killed_is_named_and_goes_on_next_time(odd, begun, tmp_path):
     foreign = tmp_path / "random/seed-001/run.sqlite"
     foreign.parent.mkdir(parents=True)
