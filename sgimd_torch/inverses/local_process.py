@@ -22,7 +22,7 @@ from sgimd_torch.memory.compiled import compiled
 from sgimd_torch.memory.exemplars import Exemplars
 from sgimd_torch.memory.growing import Growing
 from sgimd_torch.parts import Inverse, Problem
-from sgimd_torch.spaces import Array, Estimate, read_only, stream
+from sgimd_torch.spaces import Array, Box, Estimate, read_only, stream
 
 _FIRST: Final = 16  # number of exemplars at the first fit
 _GROWTH: Final = 1.5  # factor of the number of exemplars from fit to fit
@@ -68,7 +68,7 @@ class LocalProcess(Inverse):
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)
         self.memory, self.noise = problem.memory, problem.outcome_noise
-        self._plausible, self._seen = (-np.inf, np.inf), 0  # corners of a box, and number of exemplars compared with it
+        self._plausible, self._seen = (np.array(-np.inf), np.array(np.inf)), 0  # corners of a box, and number of exemplars compared with it
         self._due = float(_FIRST)  # exemplars at the next fit
         self._kernel: Kernel | None = None  # None while all outcomes are equal
 
@@ -140,9 +140,7 @@ class LocalProcess(Inverse):
         while self._due <= n:
             n_fitted, self._due = int(self._due), self._due * _GROWTH
         if n_fitted:
-            space, outcomes = self.problem.outcomes, self.problem.memory.outcomes[:n_fitted]
-            low, high = np.quantile(outcomes, _BULK, axis=0)
-            self._plausible = np.minimum(space.low, 2 * low - high), np.maximum(space.high, 2 * high - low)
+            self._plausible = plausible(self.problem.memory.outcomes[:n_fitted], self.problem.outcomes)
             self.memory, self._seen = self.problem.memory, 0
             self._leave_out(n_fitted)
             self._fit(len(self.memory) if self.memory is not self.problem.memory else n_fitted)
@@ -155,11 +153,11 @@ class LocalProcess(Inverse):
         error codes. ``memory`` becomes another one when the first of them comes."""
         every, (low, high) = self.problem.memory, self._plausible
         new = Exemplars.of(every, slice(self._seen, n))
-        plausible = ((new.outcomes >= low) & (new.outcomes <= high)).all(axis=1)
-        if self.memory is every and not plausible.all():
+        count = ((new.outcomes >= low) & (new.outcomes <= high)).all(axis=1)
+        if self.memory is every and not count.all():
             self.memory = Exemplars.of(every, slice(self._seen)).memory_like(every)
         if self.memory is not every:
-            self.memory.extend(*new.some(np.flatnonzero(plausible)))
+            self.memory.extend(*new.some(np.flatnonzero(count)))
         self._seen = n
 
     @one_thread
@@ -217,6 +215,12 @@ class LocalProcess(Inverse):
         unscaled = np.concatenate((self.memory.thetas[first:], self.memory.contexts[first:]), axis=1)
         scaled: Array = (unscaled - self._units[0]) / self._units[1]
         return scaled
+
+
+def plausible(outcomes: Array, space: Box) -> tuple[Array, Array]:
+    """Corners of the box in which outcomes count: T, and one width around the middle three fifths of them."""
+    low, high = np.quantile(outcomes, _BULK, axis=0)
+    return np.minimum(space.low, 2 * low - high), np.maximum(space.high, 2 * high - low)
 
 
 def _spreads(inputs: Array) -> Array:

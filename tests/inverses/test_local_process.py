@@ -292,3 +292,20 @@ def test_its_linear_algebra_takes_one_thread_and_leaves_the_others_as_they_were(
     before = threadpool_info()
     assert threads() == {1}
     assert threadpool_info() == before
+
+
+@pytest.mark.parametrize("code", [60.0, -1e6])
+def test_outcomes_far_outside_t_count_in_no_answer_and_in_no_prediction(code: float) -> None:
+    inputs, outcomes = waves(200)
+    wrong = outcomes.copy()
+    wrong[5::10] = code
+    right = np.arange(200) % 10 != 5
+    inverse, clean = (LocalProcess(remembering(inputs[rows], wrong[rows])) for rows in (slice(None), right))
+    points = stream(0, "points").uniform(0.5, 2.5, (20, 2))
+    expected = np.stack([np.sin(points.sum(axis=1)), np.cos(points[:, 0])], axis=1)
+    for process in (inverse, clean):
+        missed = [process.predict(NO_CONTEXT, point) - outcome for point, outcome in zip(points, expected, strict=True)]
+        assert np.linalg.norm(missed, axis=1).max() < 0.03
+    assert len(inverse.memory) == 180
+    assert len(inverse.problem.memory) == 200
+    assert inverse(NO_CONTEXT, expected[0]).expected == pytest.approx(expected[0], abs=0.01)

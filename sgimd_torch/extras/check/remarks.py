@@ -11,12 +11,14 @@ from typing import Final
 import numpy as np
 
 from sgimd_torch.environments.protocol import Environment
+from sgimd_torch.inverses.local_process import plausible
 from sgimd_torch.spaces import ROUNDING, Array
 
 LATEST: Final = 500  # number of latest outcomes that count
 FEWEST: Final = 10  # number of outcomes from which on anything is told
 EQUAL: Final = 50  # number of equal outcomes that are told after others
 NOISY: Final = 1.5  # standard deviation of outcomes, as a multiple of their noise, up to which only noise moves them
+MANY: Final = 0.2  # share of outcomes far outside T from which on they are no exceptions
 CLIPPED: Final = 0.1  # share of outcomes on the border of T that is told
 NARROW: Final = 0.03  # share of the volume of T that outcomes span; less is told
 
@@ -45,6 +47,10 @@ def remarks_on(robot: Environment, outcomes: Array) -> dict[str, str]:
     if still.any():
         names = ", ".join(space.axis(k) for k in np.flatnonzero(still).tolist())
         told["flat"] = f"{names} changes by no more than noise in the last {n} outcomes; leave it out of T"
+    least, greatest = plausible(outcomes, space)
+    if 0 < (far := ((outcomes < least) | (outcomes > greatest)).any(axis=1)).mean() < MANY:
+        what = f"{far.sum()} of the last {n} outcomes lie far outside T, such as {outcomes[far][-1].round(4).tolist()}"
+        told["far"] = f"{what}, and count in no answer: is it an error code of a sensor?"
     border = ((outcomes == space.low) | (outcomes == space.high)) & (outcomes != robot.rest) & ~still
     if (clipped := border.any(axis=1).mean()) >= CLIPPED:
         told["clipped"] = (

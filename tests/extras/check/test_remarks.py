@@ -16,6 +16,7 @@ CASES = {
     "still": 0.3 + 0.01 * stream(1, "noise").standard_normal((60, 2)),
     "flat": SPREAD * [1, 0],
     "clipped": np.clip(1.3 * SPREAD, -1, 1),
+    "far": np.where(np.arange(60)[:, None] % 20, SPREAD, 30.0),
     "outside": 1000 + SPREAD,
     "narrow": 0.1 * SPREAD,
 }
