@@ -68,7 +68,8 @@ class LocalProcess(Inverse):
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)
         self.memory, self.noise = problem.memory, problem.outcome_noise
-        self._plausible, self._seen = (np.array(-np.inf), np.array(np.inf)), 0  # corners of a box, and number of exemplars compared with it
+        self._plausible = np.array(-np.inf), np.array(np.inf)  # corners of the box in which outcomes count
+        self._seen = 0  # number of exemplars that were compared with it
         self._due = float(_FIRST)  # exemplars at the next fit
         self._kernel: Kernel | None = None  # None while all outcomes are equal
 
