@@ -5,6 +5,7 @@ import sys
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, settings
 from hypothesis.internal.conjecture import providers
 from hypothesis.internal.constants_ast import Constants
 
@@ -16,6 +17,9 @@ from sgimd_torch.runs.program import command
 
 # Hypothesis draws constants that stand in modules which happen to be loaded; a result shall not depend on other tests.
 providers._get_local_constants = Constants
+# Nor shall it depend on a clock: other programs may take the processor.
+settings.register_profile("any clock", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("any clock")
 # MuJoCo is imported without OpenGL, as a display may be missing; pictures in space are made in processes of their own.
 os.environ.setdefault("MUJOCO_GL", "disable")
 

@@ -49,7 +49,7 @@ TABLES = {  # what single precision could confuse
 }
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(
     st.sampled_from([Flat, Graph, Scan]),
     st.sampled_from(sorted(TABLES)),

@@ -138,7 +138,7 @@ def configs(draw):
 
 
 @given(configs())
-@settings(deadline=None, derandomize=True)
+@settings(derandomize=True)
 def test_the_words_and_the_settings_of_a_config_make_it_again(config):
     again, _ = parse(words(config))
     assert again == config
