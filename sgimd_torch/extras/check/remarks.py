@@ -47,7 +47,8 @@ def remarks_on(robot: Environment, outcomes: Array) -> dict[str, str]:
     if still.any():
         names = ", ".join(space.axis(k) for k in np.flatnonzero(still).tolist())
         told["flat"] = f"{names} changes by no more than noise in the last {n} outcomes; leave it out of T"
-    least, greatest = plausible(outcomes, space)
+    least, greatest = plausible(outcomes, space)  # an outcome that counts in no answer, and lies a side of T away
+    least, greatest = np.minimum(least, space.low - space.sides), np.maximum(greatest, space.high + space.sides)
     if 0 < (far := ((outcomes < least) | (outcomes > greatest)).any(axis=1)).mean() < MANY:
         what = f"{far.sum()} of the last {n} outcomes lie far outside T, such as {outcomes[far][-1].round(4).tolist()}"
         told["far"] = f"{what}, and count in no answer: is it an error code of a sensor?"
