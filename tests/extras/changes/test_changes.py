@@ -11,13 +11,15 @@ from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.extras.changes.calibration import Calibration
-from sgimd_torch.extras.changes.eras import Era, Exemplars
+from sgimd_torch.extras.changes.eras import Era
 from sgimd_torch.extras.changes.watcher import changes
 from sgimd_torch.forward_model.search import GradientSearch
 from sgimd_torch.inverses.local import LocalInverse
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.inverses.nearest import NearestNeighbour
 from sgimd_torch.learner.events import Kind
+from sgimd_torch.memory import Memory
+from sgimd_torch.memory.exemplars import Exemplars
 from sgimd_torch.parts import Inverse
 from sgimd_torch.record.replay import load_life, save_life
 from sgimd_torch.session import run
@@ -270,3 +272,15 @@ def test_a_calibration_finds_offset_and_gain():
     found = Calibration(era, ARM.policies).fit(now)
     assert np.abs(found.predict(now) - now.outcomes).max() < 0.02
     assert found.p[:6] == pytest.approx([-0.1] * 3 + [0.04] * 3, abs=0.02)
+
+
+class Own(Memory):
+    """A memory of a user's."""
+
+
+def test_a_users_memory_stays_what_it_is_when_the_learner_begins_again():
+    learner = practice(ARM, 0, memory=Own)
+    live(learner, Changing(ARM, "none", 0), 40)
+    again = learner.watcher.begin_again(Exemplars.of(learner.memory, slice(10)), 40)
+    assert type(again.memory) is type(again.problem.memory) is Own
+    assert type(practice(ARM, 0, memory=Own, prior=learner.memory).problem.memory) is Own
