@@ -20,6 +20,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from sgimd_torch.environments.protocol import Environment, execute_many, moves_in_batches, observed, tried
 from sgimd_torch.files import read_npz, write_npz
+from sgimd_torch.memory.growing import Growing
+from sgimd_torch.memory.neighbours import Flat
 from sgimd_torch.parts import Inverse
 from sgimd_torch.spaces import Array, Box, Estimate, Failure, check_count, check_vector, first_entry, stream
 
@@ -119,14 +121,10 @@ def beyond(outcomes: Array, goals: Array) -> NDArray[np.bool_]:
     """
     if len(outcomes) < NEAREST:
         return np.zeros(len(goals), bool)
-    outside, far = np.zeros(len(goals), bool), FAR * np.linalg.norm(np.ptp(outcomes, axis=0))
-    for k, goal in enumerate(goals):
-        ways = outcomes - goal
-        distances = np.linalg.norm(ways, axis=1)
-        near = np.argpartition(distances, NEAREST - 1)[:NEAREST]
-        one_side = np.linalg.norm(ways[near].mean(axis=0)) > ONE_SIDE * distances[near].mean()
-        outside[k] = one_side and distances[near].min() > far
-    return outside
+    ways = outcomes[Flat(Growing(outcomes.shape[1], outcomes)).nearest(goals, NEAREST)] - goals[:, None]
+    distances, far = np.linalg.norm(ways, axis=2), FAR * np.linalg.norm(np.ptp(outcomes, axis=0))
+    one_side = np.linalg.norm(ways.mean(axis=1), axis=1) > ONE_SIDE * distances.mean(axis=1)
+    return np.asarray(one_side & (distances[:, 0] > far))
 
 
 @dataclass

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 from sgimd_torch.runs.hooks import Hook, Listener
 
 if TYPE_CHECKING:
+    from sgimd_torch.board.listener import BoardListener
     from sgimd_torch.runs.run import RunLoop
 
 
@@ -33,3 +34,13 @@ class Board(Hook):
         from sgimd_torch.board.listener import BoardListener  # most runs have no board
 
         return BoardListener(loop.parts.config.directory, loop.parts, loop.seconds.summary, loop.curves)
+
+
+def board_of(loop: RunLoop) -> BoardListener | None:
+    """The listener that writes the board of a run; None: it has no board."""
+    if not loop.parts.config["board"]:
+        return None
+    from sgimd_torch.board.listener import BoardListener
+
+    (board,) = (listener for listener in loop.listeners if isinstance(listener, BoardListener))
+    return board

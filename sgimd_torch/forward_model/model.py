@@ -129,9 +129,7 @@ class ForwardModel(LightningModule):
         loggers: Sequence[Any] = (),
     ) -> None:
         super().__init__()
-        self.save_hyperparameters(
-            ignore=["network", "accelerator", "loggers"]
-        )  # a device is chosen when a model is loaded
+        self.save_hyperparameters(ignore=["network", "accelerator", "loggers"])  # these are chosen when it is loaded
         dims = context_dim, theta_dim, outcome_dim
         self.sizes = dict(zip(("context_dim", "theta_dim", "outcome_dim"), dims, strict=True))
         for name, count in {**self.sizes, "members": members, "every": every, "batch": batch}.items():

@@ -102,9 +102,7 @@ def fitted_process(rows: np.ndarray, inputs: Array, outcomes: Array, kernel: Ker
 def process_of(inputs: Array, outcomes: Array, kernel: Kernel) -> GaussianProcess:
     """The process of these movements, columns of ``inputs`` and ``outcomes``, all with the same noise."""
     m, n = outcomes.shape
-    covariance, slope = np.zeros((n, n)), np.empty(n)
-    for i in range(n):
-        covariances(inputs, kernel, inputs[:, i].copy(), covariance[i, : i + 1], slope[: i + 1])
+    covariance, _ = covariance_matrix(inputs, kernel)
     factor, weights, mean, variance = factorised(covariance, kernel.noise), np.empty((m, n)), np.empty(m), 0.0
     for k in range(m):
         mean[k] = outcomes[k].sum() / n
@@ -214,11 +212,11 @@ def in_lengths(theta: Array, context: Array, units: Array) -> Array:
 
 @jit_helper
 def descend(
-    process: GaussianProcess, start: Array, question: Question, known: Movements, inflation: float
+    process: GaussianProcess, start: Array, context: Array, goal: Array, known: Movements, inflation: float
 ) -> tuple[float, Array]:
     """Least expected squared error, and its theta, after damped Gauss-Newton steps from ``start`` ``(theta_dim,)``.
     Steps end when they do not help; they have the least norm, so unimportant parameters hardly change."""
-    context, goal, units, spreads, box = question.context, question.goal, known.units, known.spreads, known.box
+    units, spreads, box = known.units, known.spreads, known.box
     n, t, m = process.inputs.shape[1], len(start), len(goal)
     least, best = np.inf, start
     covariance, slope = np.empty((1 + len(DAMPINGS), n)), np.empty((1 + len(DAMPINGS), n))
@@ -293,7 +291,7 @@ def answer(question: Question, known: Movements, kernel: Kernel) -> tuple[Array,
             error_of_linear = expected_error(process, goal, inflation, covariance, error)
             if error_of_linear < error:
                 error, theta = error_of_linear, linear
-        error_of_end, end = descend(process, known.thetas[row], question, known, inflation)
+        error_of_end, end = descend(process, known.thetas[row], context, goal, known, inflation)
         if error_of_end < error:
             error, theta = error_of_end, end
         if error + scatter < least:
@@ -320,8 +318,7 @@ def uncertainty(alike: np.ndarray, goals: Array, context: Array, known: Movement
     for i in range(n):
         rows = alike[i]
         process, _ = fitted_process(rows, known.inputs, known.outcomes, kernel)
-        question = Question(context, goals[i], rows, alike, rows, context)
-        _, theta = descend(process, known.thetas[rows[0]], question, known, float(goals.shape[1]))
+        _, theta = descend(process, known.thetas[rows[0]], context, goals[i], known, float(goals.shape[1]))
         covariances(process.inputs, kernel, in_lengths(theta, context, known.units), covariance, slope)
         sds[i] = np.sqrt(variance_at(process, covariance))
     return sds

@@ -144,8 +144,9 @@ class LocalProcess(Inverse):
             self._plausible = plausible(self.problem.memory.outcomes[:n_fitted], self.problem.outcomes)
             self.memory, self._seen = self.problem.memory, 0
             self._leave_out(n_fitted)
-            self._fit(len(self.memory) if self.memory is not self.problem.memory else n_fitted)
-        self._leave_out(n)
+            self._fit(min(n_fitted, len(self.memory)))
+        if self._seen < n:
+            self._leave_out(n)
         if self._kernel is not None and len(self._inputs.keys) < len(self.memory):
             self._inputs.keys.append(self._scaled(len(self._inputs.keys)))
 

@@ -18,8 +18,6 @@ TABLE: Final = types.Array(types.float64, 2, "C", readonly=True)
 ROWS: Final = types.Array(types.int64, 1, "C", readonly=True)  # row numbers of a table
 LISTS: Final = types.Array(types.int64, 2, "C", readonly=True)  # row numbers, one list in each row
 WRITABLE_NUMBERS: Final = types.Array(types.float64, 1, "C")  # the function writes into the caller's array
-WRITABLE_LISTS: Final = types.Array(types.int64, 2, "C")
-WRITABLE_TABLE: Final = types.Array(types.float64, 2, "C")
 
 
 def compiled_for(*arguments: types.Type) -> Any:

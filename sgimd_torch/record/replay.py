@@ -29,13 +29,8 @@ _TRAINED_ELSEWHERE: Final = (
     "movement {} was recorded with another theta: another device or processor trained the forward model. The learner "
     "remembers the recorded thetas"
 )
-_ALONE: Final = (
-    Kind.SHOWN,
-    Kind.ASKED,
-    Kind.ADDED,
-    Kind.RESTARTED,
-    Kind.CHANGED,
-)  # events that are never grouped with others
+# Events that are never grouped with others.
+_ALONE: Final = (Kind.SHOWN, Kind.ASKED, Kind.ADDED, Kind.RESTARTED, Kind.CHANGED)
 _ROUNDED: Final = (
     "movement {} was recorded with a theta that differs by rounding: another version or processor made the record. The "
     "learner remembers the recorded theta"

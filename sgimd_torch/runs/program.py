@@ -58,9 +58,7 @@ def command(main: Callable[[Sequence[str]], int], argv: Sequence[str] | None = N
         except OSError as error:
             code, why = 2, str(error)  # an error of this library has a complete message
             if error.filename is not None:
-                name = str(
-                    error.filename
-                )  # with control characters and lone surrogates, it is shown as Python spells it
+                name = str(error.filename)  # with control characters or lone surrogates, it is shown as Python does
                 why = f"{name if name.isprintable() else repr(name)} cannot be read or written: {error.strerror}"
             elif error.errno is not None:
                 code, why = 1, f"not everything could be written: {error.strerror}"

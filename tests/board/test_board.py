@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from tensorboardX import summary
 
-from boards import board_of, curves_of, hparams_of
-from own import MODULE
+from boards import ANY_OUTCOMES, board_of, board_of_any, curves_of, hparams_of
 from runs import content_of
 from sgimd_torch.board.curves import Behaviour, Places, evaluation_curves, region_curves, tiles_of
 from sgimd_torch.board.legend import LEGEND
@@ -282,11 +281,7 @@ def test_a_board_changes_no_byte_of_its_run_and_shows_it_from_the_first_movement
     assert made == content(board_of(resumed))
 
 
-@pytest.mark.parametrize("robot", ["sliders:Slider", "sliders:Slider3", "sliders:Shifted", "formula:Slider2"])
+@pytest.mark.parametrize("robot", ANY_OUTCOMES)
 def test_outcomes_of_any_dimension_or_named_like_a_formula_have_curves(own, module, robot):
-    named = "self.outcomes = Box(-np.ones(2), 3 * np.ones(2), ('$\\\\frac{$', '$x_$'), '$\\\\frac{$')"
-    module("formula", MODULE.replace("        self.rest", f"        {named}\n        self.rest", 1))
-    words = f"--environment {robot} --algorithm sagg-riac --movements 60 --evaluate-at 30 --repeats 0 --out runs"
-    assert command(main, [*words.split(), "--board", "true"]) == 0
-    directory = Path("runs/sagg-riac/seed-000")
+    directory = board_of_any(robot, module)
     assert {"error/mean", "competence/mean", "regions/interest", "goals/missed_by"} < curves_of(directory).keys()

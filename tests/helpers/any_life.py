@@ -220,3 +220,16 @@ def check_lives(machine):
         machine,
         settings=settings(max_examples=5, stateful_step_count=20, deadline=None, derandomize=True, database=None),
     )
+
+
+def check_start(build, path):
+    """A learner leaves the memory that it starts from as it was; so does the one that loads its life from ``path``."""
+    start = exemplars(30)
+    learner, again = (build(QUIET, 0, memory=start) for _ in range(2))
+    for _ in run(learner, QUIET, 0, movements=25):
+        pass
+    save_life(learner, path)
+    load_life(again, path)
+    assert (len(start), len(learner.memory)) == (30, 55)
+    assert np.array_equal(learner.memory.thetas[:30], start.thetas)
+    assert np.array_equal(again.memory.thetas, learner.memory.thetas)

@@ -1,5 +1,7 @@
 """Helpers for tests of boards: they read the event file of a run with TensorBoard's own reader."""
 
+from pathlib import Path
+
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 from tensorboard.plugins.hparams.metadata import (
     EXPERIMENT_TAG,
@@ -7,6 +9,13 @@ from tensorboard.plugins.hparams.metadata import (
     parse_experiment_plugin_data,
     parse_session_start_info_plugin_data,
 )
+
+from own import MODULE
+from sgimd_torch.runs.command import main
+from sgimd_torch.runs.program import command
+
+# Robots with outcomes of one, three and two dimensions; the names of the last one look like formulas.
+ANY_OUTCOMES = ["sliders:Slider", "sliders:Slider3", "sliders:Shifted", "formula:Slider2"]
 
 
 def board_of(directory):
@@ -40,3 +49,12 @@ def hparams_of(directory):
     about = parse_experiment_plugin_data(board.SummaryMetadata(EXPERIMENT_TAG).plugin_data.content)
     assert {info.name for info in about.hparam_infos} == values.keys()
     return values, [info.name.tag for info in about.metric_infos]
+
+
+def board_of_any(robot, module):
+    """The directory of a run with a board, on one of the robots ``ANY_OUTCOMES``."""
+    named = "self.outcomes = Box(-np.ones(2), 3 * np.ones(2), ('$\\\\frac{$', '$x_$'), '$\\\\frac{$')"
+    module("formula", MODULE.replace("        self.rest", f"        {named}\n        self.rest", 1))
+    words = f"--environment {robot} --algorithm sagg-riac --movements 60 --evaluate-at 30 --repeats 0 --out runs"
+    assert command(main, [*words.split(), "--board", "true"]) == 0
+    return Path("runs/sagg-riac/seed-000")

@@ -9,7 +9,7 @@ from sgimd_torch.inverses.gaussian_process import choose_kernel, fit_lengths, on
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.inverses.locally_linear import LocallyLinear
 from sgimd_torch.inverses.nearest import NearestNeighbour
-from sgimd_torch.inverses.tuples import GaussianProcess, Kernel, Movements, Question
+from sgimd_torch.inverses.tuples import GaussianProcess, Kernel, Movements
 from sgimd_torch.memory.compiled import compiled
 from sgimd_torch.parts import Inverse, Problem
 from sgimd_torch.spaces import Array, stream
@@ -17,7 +17,6 @@ from worlds import NO_CONTEXT, problem, remember
 
 kernels = compiled("sgimd_torch.inverses.kernels")  # an import would leave machine code of its own beside the module
 
-NO_ROWS = np.zeros(1, int)
 SMOOTH = Kernel(scale=1.0, finer=1.0, share=0.0, noise=1e-6)
 ROUGH = Kernel(scale=0.5, finer=4.0, share=0.3, noise=0.1)
 
@@ -91,9 +90,7 @@ def test_steps_reach_the_goal_where_the_process_can_reach_it(kernel: Kernel) -> 
     process, point, goal = fitted(inputs, outcomes, kernel), np.array([1.3, 0.9]), np.array([0.5, -0.4])
     units, box = np.stack((np.zeros(2), np.ones(2))), np.stack((np.zeros(2), np.full(2, 3.0)))
     known = Movements(inputs, inputs, outcomes, units, np.ones(2), box)
-    _, theta = kernels.descend(
-        process, point, Question(NO_CONTEXT, goal, NO_ROWS, NO_ROWS[None], NO_ROWS, point), known, 1e-9
-    )
+    _, theta = kernels.descend(process, point, NO_CONTEXT, goal, known, 1e-9)
     missed, reached = (np.linalg.norm(predicted(inputs, outcomes, kernel, at)[0] - goal) for at in (point, theta))
     assert reached < 0.1 * missed
 

@@ -6,7 +6,7 @@ import pickle
 import numpy as np
 import pytest
 
-from any_life import ARM, LESSONS, NEAREST, QUIET, WATCHES, Lives, check_lives, exemplars
+from any_life import ARM, LESSONS, NEAREST, QUIET, WATCHES, Lives, check_lives, check_start, exemplars
 from sgimd_torch import session
 from sgimd_torch.algorithms.paper import observation, random_exploration, sagg_riac, sgim_d
 from sgimd_torch.algorithms.practice import practice, practice_taught
@@ -130,15 +130,7 @@ def test_lessons_of_different_shape_are_saved(tmp_path):
 
 @pytest.mark.parametrize("build", [random_exploration, sagg_riac])
 def test_a_learner_starts_from_a_memory_and_leaves_it_as_it_was_and_so_does_the_one_that_loads(build, tmp_path):
-    start = exemplars(30)
-    learner, again = (build(QUIET, 0, memory=start) for _ in range(2))
-    for _ in run(learner, QUIET, 0, movements=25):
-        pass
-    save_life(learner, tmp_path / "life.sqlite")
-    load_life(again, tmp_path / "life.sqlite")
-    assert (len(start), len(learner.memory)) == (30, 55)
-    assert np.array_equal(learner.memory.thetas[:30], start.thetas)
-    assert np.array_equal(again.memory.thetas, learner.memory.thetas)
+    check_start(build, tmp_path / "life.sqlite")
 
 
 def test_a_memory_of_another_robot_is_no_start():

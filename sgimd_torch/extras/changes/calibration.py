@@ -54,8 +54,7 @@ class Calibration:
         for _ in range(_STEPS):
             predicted, variances, slopes = prediction
             errors = squared(current.outcomes - predicted)
-            usual = np.median(errors) + np.maximum(variances, 1e-300)
-            weights = 1 / (usual * (1 + errors / (4 * usual)))
+            weights = 1 / _doubts(errors, variances)
             curvature = np.einsum("nik,n,nil->kl", slopes, weights, slopes) + np.diag(self.precision)
             descent = np.einsum("nik,n,ni->k", slopes, weights, current.outcomes - predicted) - p * self.precision
             loss = errors @ weights + p * p @ self.precision
@@ -115,12 +114,9 @@ class Calibration:
         differences, errors = current.outcomes - predicted, np.empty(len(predicted))
         for half in (0, 1):
             fitted, tested = slice(1 - half, None, 2), slice(half, None, 2)
-            by_row, usual_variances = slopes[fitted], np.maximum(variances[fitted], 1e-300)
-            left = differences[fitted]
+            by_row, left = slopes[fitted], differences[fitted]
             for _ in range(_REWEIGHTED):
-                squares = squared(left)
-                usual = np.median(squares) + usual_variances
-                weighted = by_row / (usual * (1 + squares / (4 * usual)))[:, None, None]
+                weighted = by_row / _doubts(squared(left), variances[fitted])[:, None, None]
                 flat = weighted.reshape(-1, len(self.p))
                 curvature = by_row.reshape(-1, len(self.p)).T @ flat + np.diag(self.precision)
                 p = np.linalg.solve(curvature, differences[fitted].reshape(-1) @ flat)
@@ -148,6 +144,13 @@ class Calibration:
             slopes[:, k, 2 * self.dim + k] = self.spread
             slopes[:, k, 2 * self.dim + self.outcome_dim + k :: self.outcome_dim] = expected - self.mean
         return self._g(expected, p), variances, slopes
+
+
+def _doubts(errors: Array, variances: Array) -> Array:
+    """Inverse weights ``(n,)`` of movements with these squared errors, by Cauchy: what fits worse counts less."""
+    usual = np.median(errors) + np.maximum(variances, 1e-300)
+    doubts: Array = usual * (1 + errors / (4 * usual))
+    return doubts
 
 
 def by_halves(era: Era, policies: Box, current: Exemplars) -> Array:

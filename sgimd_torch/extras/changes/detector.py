@@ -156,9 +156,8 @@ class ChangeDetector:
         of_each_other, shifted = Era(fitted, tested).left_out_each(), shifted_by_halves(tested.outcomes - expected)
         calibrated = Calibration(earlier, self.problem.policies).linear_by_halves(tested, prediction)
         subsets = (slice(None), sure), (as_it_was > failed, SURE)  # a local change is seen in those that failed
-        of_all: Array | None = (
-            None  # if nothing had changed, all others would predict, too; they err more if noise grew
-        )
+        # If nothing had changed, all others would predict, too; they err more if noise grew.
+        of_all: Array | None = None
         for errors in (of_each_other, calibrated, shifted):
             for some, least in subsets:
                 if better(as_it_was[some], errors[some], self.noise) < least:

@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping
 from typing import Any, ClassVar, Final
 
+from sgimd_torch.board import board_of
 from sgimd_torch.runs.hooks import Hook, Listener
 from sgimd_torch.texts import unknown_name_error
 
@@ -42,8 +43,7 @@ class Logging(Hook):
             return None
         from lightning.pytorch import loggers  # takes seconds
 
-        (board,) = (listener for listener in loop.listeners if hasattr(listener, "trackers"))
-        config, name = loop.parts.config, "sgimd_torch"
+        board, config, name = board_of(loop), loop.parts.config, "sgimd_torch"
         if self.logger == "csv":
             return Logged(loggers.CSVLogger(config.directory, name="csv"), board)
         if self.logger == "wandb":

@@ -142,7 +142,8 @@ def _load(path: Path, joints: Sequence[str], servos: str, keyframe: str, posture
 def _check_parts(path: Path) -> None:
     """Refuse what MuJoCo would wait for, a pipe or a device that the model refers to, a model that is too large for it,
     and a template of ROS."""
-    elements, known, n_parts = [*_root(path).iter()], {path}, _n_parts(_root(path))
+    roots, known = [_root(path)], {path}
+    elements = [*roots[0].iter()]
     for element in elements:  # grows
         if element.tag.startswith("xacro:") or any("${" in text or "$(" in text for text in element.attrib.values()):
             raise ValueError(f"{path.name} is a template of xacro; give its result: xacro {path.name} > robot.urdf")
@@ -150,9 +151,9 @@ def _check_parts(path: Path) -> None:
         if element.tag == "include" and included not in known and included.exists() and not included.is_dir():
             check_regular(included)
             known.add(included)
-            elements += _root(included).iter()
-            n_parts += _n_parts(_root(included))
-    if n_parts > MOST_PARTS:
+            roots.append(_root(included))
+            elements += roots[-1].iter()
+    if sum(map(_n_parts, roots)) > MOST_PARTS:
         raise _too_large(path)
     compilers = [element.attrib for element in elements if element.tag == "compiler"]
     folders = {path.parent / compiler.get(kind, "") for compiler in compilers for kind in _FOLDERS} | {path.parent}

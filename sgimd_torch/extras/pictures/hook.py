@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from sgimd_torch.board import board_of
 from sgimd_torch.runs.hooks import Hook, Listener
 from sgimd_torch.runs.messages import say
 
@@ -19,12 +20,8 @@ class Pictures(Hook):
 
     def listener(self, loop: RunLoop) -> Listener | None:
         """A listener that draws them, if the run has a board."""
-        if not loop.parts.config["board"]:
-            return None
-        from sgimd_torch.board.listener import BoardListener  # most runs have no board
-
-        (board,) = (listener for listener in loop.listeners if isinstance(listener, BoardListener))
-        return Drawing(loop, board)
+        board = board_of(loop)
+        return None if board is None else Drawing(loop, board)
 
 
 class Drawing(Listener):

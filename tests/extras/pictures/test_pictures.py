@@ -1,16 +1,11 @@
 """Pictures on the board: what they show, when they are drawn, and that a resumed run has the same."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from matplotlib import rc_context
 
-from boards import board_of, pictures_of
-from own import MODULE
+from boards import ANY_OUTCOMES, board_of, board_of_any, pictures_of
 from sgimd_torch.extras.pictures import pictures
-from sgimd_torch.runs.command import main
-from sgimd_torch.runs.program import command
 from sgimd_torch.spaces import Box, stream
 from worlds import interest_map
 
@@ -63,13 +58,9 @@ def test_pictures_are_drawn_when_there_were_eight_times_as_many_movements_and_at
     assert all(board_of(whole).SummaryMetadata(tag).summary_description for tag in drawn)
 
 
-@pytest.mark.parametrize("robot", ["sliders:Slider", "sliders:Slider3", "sliders:Shifted", "formula:Slider2"])
+@pytest.mark.parametrize("robot", ANY_OUTCOMES)
 def test_outcomes_of_any_dimension_or_named_like_a_formula_have_pictures(own, module, robot):
-    named = "self.outcomes = Box(-np.ones(2), 3 * np.ones(2), ('$\\\\frac{$', '$x_$'), '$\\\\frac{$')"
-    module("formula", MODULE.replace("        self.rest", f"        {named}\n        self.rest", 1))
-    words = f"--environment {robot} --algorithm sagg-riac --movements 60 --evaluate-at 30 --repeats 0 --out runs"
-    assert command(main, [*words.split(), "--board", "true"]) == 0
-    assert pictures_of(Path("runs/sagg-riac/seed-000")).keys() == {"map/error", "map/regions", "map/interest"}
+    assert pictures_of(board_of_any(robot, module)).keys() == {"map/error", "map/regions", "map/interest"}
 
 
 def test_a_picture_that_fails_ends_no_run(tmp_path, go, monkeypatch, capsys):
