@@ -54,8 +54,8 @@ class Competence(Judge):
         problem, memory = self.problem, self.problem.memory
         if not len(memory):
             return -1.0
-        nearest = memory.outcomes[memory.near_outcomes(context, goal, 1)[0]]
-        return float(performance(goal, nearest, problem.rest, problem.tolerance))
+        nearest = memory.outcomes[memory.near_outcomes(context, goal, 1)]
+        return _best(problem, goal, nearest)
 
 
 class AttemptCompetence(Judge):
@@ -70,7 +70,8 @@ class AttemptCompetence(Judge):
 
 
 def _best(problem: Problem, goal: Array, outcomes: Array) -> float:
-    return float(np.max(performance(goal, outcomes, problem.rest, problem.tolerance), initial=-1.0))
+    outcomes, rest = (problem.outcomes.unwrapped(points, goal) for points in (outcomes, problem.rest))
+    return float(np.max(performance(goal, outcomes, rest, problem.tolerance), initial=-1.0))
 
 
 def _distance(a: Array, b: Array) -> Array:

@@ -247,9 +247,10 @@ def evaluate(
     scatter = np.full(len(goals), np.nan)
     if repeats:
         bessel = np.sqrt(repeats / (repeats - 1))
+        again = environment.outcomes.unwrapped(again, landed[0])
         scatter = bessel * np.linalg.norm(again - again.mean(axis=0), axis=2).mean(axis=0)
     reached = np.where(np.isnan(outcomes), environment.rest, outcomes)
-    errors, expected = np.linalg.norm(reached - goals, axis=1), expected_errors(answers[:n], goals)
+    errors, expected = environment.outcomes.distance(reached, goals), expected_errors(answers[:n], goals)
     return Evaluation(errors, thetas[:n], outcomes, scatter, contexts[:n], failed, expected)
 
 

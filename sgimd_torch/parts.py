@@ -60,7 +60,7 @@ class Problem:
         self.rest, self.outcome_noise, self.seed = environment.rest, environment.outcome_noise, seed
         self.tolerance = max(environment.outcome_noise, 0.02)
         self._shared: dict[object, Any] = {}
-        self.memory = memory_for(memory, self.dims)
+        self.memory = memory_for(memory, self.dims, self.outcomes)
         self.policies.check("thetas of a memory to start from", self.memory.thetas, "is it another robot's?")
         self.remarks: list[str] = []
         self.inverse = Inverse.of(inverse, self)
@@ -173,6 +173,11 @@ class Inverse(Part):
         """Expected outcome ``(outcome_dim,)`` of ``theta`` ``(theta_dim,)``. Default: None, which means unknown."""
         return None
 
+    def unexplained(self, context: Array, theta: Array, outcome: Array) -> float:
+        """Distance of the ``outcome`` of a remembered movement from the one that similar movements let expect, if noise
+        does not explain it, else 0. Default: 0."""
+        return 0.0
+
     def effects(self) -> Memory | None:
         """Exemplars with an effect, if most movements have none. Default: None, which means that all have one."""
         return None
@@ -200,6 +205,13 @@ class Explore(Part):
     def share(self) -> float | None:
         """Probability of a global movement. Default: None, which means that competence at the goal decides."""
         return None
+
+    def instead(self, estimate: Estimate, goal: Array) -> bool:
+        """Whether a global movement replaces the local one from this ``estimate``. Default: no."""
+        return False
+
+    def add(self, theta: Array) -> None:
+        """Learn that a global movement ``theta`` has an outcome, the last one in memory. Default: nothing."""
 
 
 class Judge(Part):

@@ -147,6 +147,7 @@ def _in_short(value: object) -> str:
     return " ".join(reprlib.repr(value).split())
 
 
+_TURNS: Final = {"rad": 2 * math.pi, "deg": 360.0, "degrees": 360.0, "°": 360.0, "turns": 1.0}  # one turn in each unit
 ROUNDING: Final = 1e-6
 """Largest difference of two points that counts as rounding, relative to the sides of their box."""
 
@@ -160,15 +161,19 @@ class Box:
         high: ``(dim,)`` upper corner, above ``low`` in every dimension.
         names: names of the dimensions, for axes, columns and messages; () for none.
         unit: unit of all dimensions, such as "m"; "" for none.
+        periodic: whether each dimension wraps, such as a heading, whose side is then a whole turn; () for none. Only
+            outcomes may wrap: contexts and parameters are given as cosine and sine.
 
     Raises:
-        ValueError: the corners differ in shape, are not finite or not in order, or the number of names is wrong.
+        ValueError: the corners differ in shape, are not finite or not in order, the number of names is wrong, or a
+            periodic side is no whole turn in its unit.
     """
 
     low: Array
     high: Array
     names: tuple[str, ...] = ()
     unit: str = ""
+    periodic: tuple[bool, ...] = ()
 
     def __post_init__(self) -> None:
         low, high = np.array(self.low, dtype=np.float64), np.array(self.high, dtype=np.float64)
@@ -193,6 +198,17 @@ class Box:
             wanted = "all texts without control characters"
             raise ValueError(f"Box needs {len(low)} names and a unit, {wanted}, got {given!r} and {self.unit!r}")
         object.__setattr__(self, "names", names)
+        wraps = tuple(map(bool, self.periodic))
+        if len(wraps) not in (0, len(low)):
+            raise ValueError(f"Box needs {len(low)} values of periodic, got {self.periodic}")
+        turn = _TURNS.get(self.unit)
+        for k in np.flatnonzero(wraps):
+            if turn is not None and not math.isclose(high[k] - low[k], turn, rel_tol=1e-6):
+                raise ValueError(
+                    f"dimension {k} wraps, so its side must be a whole turn, {turn:.9g} {self.unit}, got "
+                    f"[{low[k]}, {high[k]}]; is it in another unit, or not periodic?"
+                )
+        object.__setattr__(self, "periodic", wraps if any(wraps) else ())
         for name, corner in (("low", low), ("high", high)):
             corner.flags.writeable = False
             object.__setattr__(self, name, corner)
@@ -224,6 +240,33 @@ class Box:
         """The value with its unit: "0.12 m", or "0.12" if there is no unit."""
         return f"{value:{form}} {self.unit}".rstrip()
 
+    def wrapped(self, points: Array) -> Array:
+        """``(..., dim)``, the same points, periodic dimensions within the box."""
+        if not self.periodic:
+            return points
+        outside = (points < self.low) | (points > self.high)
+        return np.where(outside & self.periodic, self.low + (points - self.low) % self.sides, points)
+
+    def unwrapped(self, points: Array, around: Array) -> Array:
+        """``(..., dim)``, the same points, periodic dimensions at most half a turn from ``around`` ``(..., dim)``."""
+        if not self.periodic:
+            return points
+        return np.where(self.periodic, points - np.round((points - around) / self.sides) * self.sides, points)
+
+    def distance(self, points: Array, point: Array) -> Any:
+        """``(...)``, distances of ``points`` ``(..., dim)`` to a ``point``, across the seam if that is shorter."""
+        return np.linalg.norm(self.unwrapped(points, point) - point, axis=-1)
+
+    def on_circles(self, points: Array) -> Array:
+        """``(..., dim + number of periodic dimensions)``: each periodic dimension as cosine and sine, on a circle as
+        long as a turn. So distances of near points stay the same, also across the seam."""
+        if not self.periodic:
+            return points
+        radii = self.sides[[*self.periodic]] / (2 * np.pi)
+        angles = points[..., [*self.periodic]] / radii
+        straight = points[..., [not wraps for wraps in self.periodic]]
+        return np.concatenate((straight, radii * np.cos(angles), radii * np.sin(angles)), axis=-1)
+
     def sample(self, rng: np.random.Generator) -> Array:
         """``(dim,)``, a uniform point."""
         return self.low + self.sides * rng.random(self.dim)  # several times faster than rng.uniform, with equal draws
@@ -245,12 +288,12 @@ class Box:
         return np.asarray((np.abs(np.subtract(points, point)) <= ROUNDING * self.sides).all(axis=-1))
 
     def check(self, name: str, points: ArrayLike, hint: str = "") -> Array:
-        """``points`` as float64 ``(..., dim)``, all inside.
+        """``points`` as float64 ``(..., dim)``, all inside; periodic dimensions are wrapped.
 
         Raises:
             ValueError: another shape, a value that is not finite, or a point outside.
         """
-        array = check_vector(name, points, self.dim, hint)
+        array = self.wrapped(check_vector(name, points, self.dim, hint))
         if not ((array >= self.low) & (array <= self.high)).all():
             outside = (array < self.low) | (array > self.high)
             k = np.argwhere(outside)[0, -1]

@@ -16,7 +16,7 @@ import numpy as np
 from sgimd_torch.competence import Competence
 from sgimd_torch.parts import Explore, Goals, Judge, Part, Problem, Search, Social, Strategy
 from sgimd_torch.searches.explore import Anywhere
-from sgimd_torch.spaces import Array, Attempt, Demonstration, Move, check_count
+from sgimd_torch.spaces import Array, Attempt, Demonstration, Estimate, Move, check_count
 
 
 class Babble(Strategy):
@@ -63,7 +63,7 @@ class GoalBabbling(Strategy):
         ValueError: a number is out of its range, or a part is of another kind.
     """
 
-    draws_from = "regime"  # choice of a global or a local movement; a stream keeps its name
+    draws_from = "regime"  # the paper's word for global exploration and for local optimisation
 
     def __init__(
         self,
@@ -116,8 +116,10 @@ class GoalBabbling(Strategy):
         move = next(moves)
         try:
             while True:
-                outcome = yield move
+                outcome = self.problem.outcomes.unwrapped((yield move), goal)
                 outcomes.append(outcome)
+                if move is not None and move.origin == "global":
+                    self.explore.add(move.theta)
                 if len(outcomes) == self.budget or np.linalg.norm(outcome - goal) <= self.tolerance:
                     return
                 previous, best = best, self.competence_at(context, goal)
@@ -157,8 +159,12 @@ class GoalBabbling(Strategy):
             if self.rng.random() < self._global_probability(context, goal):
                 # Deviation: the paper prints "theta in T", which must be Pi.
                 yield Move(self.explore(context), goal, "global")
+                continue
+            estimate = self.inverse(context, goal)
+            if self.explore.instead(estimate, goal):
+                yield Move(self.explore(context), goal, "global")
             else:
-                yield from self._optimise(context, goal)
+                yield from self._optimise(estimate, goal)
 
     def _global_probability(self, context: Array, goal: Array) -> float:
         """Probability of global exploration; the lower the competence at the goal, the higher."""
@@ -171,9 +177,9 @@ class GoalBabbling(Strategy):
         least, greatest = self.global_range
         return min(max(-self.competence(context, goal), least), greatest)
 
-    def _optimise(self, context: Array, goal: Array) -> Attempt:
+    def _optimise(self, estimate: Estimate, goal: Array) -> Attempt:
         """Movements of a search that begins at the estimate of the inverse model, until the search ends."""
-        search = self.search(self.inverse(context, goal), goal)
+        search = self.search(estimate, goal)
         theta = next(search, None)
         while theta is not None:
             outcome = yield Move(theta, goal, "local")

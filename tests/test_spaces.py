@@ -152,3 +152,35 @@ def test_an_estimate_says_how_far_its_outcome_may_be_off_and_from_the_goal(dim):
         assert 0.98 < estimate.expected_error(goal) / found < 1.11
     unknown = estimate._replace(expected=None, sd=None)
     assert np.isnan([unknown.expected_deviation, unknown.expected_error(np.ones(dim))]).all()
+
+
+HEADING = Box([-1, 0], [1, 360], ("x", "heading"), periodic=(False, True))
+
+
+def test_periodic_outcomes_are_as_far_apart_as_the_shorter_way_round():
+    a, b = np.array([0.0, 359.0]), np.array([0.0, 2.0])
+    assert HEADING.distance(a, b) == pytest.approx(3)
+    assert HEADING.unwrapped(a, b).tolist() == [0.0, -1.0]
+    assert HEADING.wrapped(np.array([5.0, -1.0])).tolist() == [5.0, 359.0]
+    assert HEADING.check("goal", [0, 361]).tolist() == [0.0, 1.0]
+    on_circles = HEADING.on_circles(np.stack([a, b]))
+    assert np.linalg.norm(on_circles[0] - on_circles[1]) == pytest.approx(3, rel=1e-3)
+
+
+def test_without_periodic_dimensions_points_stay_the_same_objects():
+    plane, points = Box.cube(-1, 1, 2), np.ones((3, 2))
+    assert plane.wrapped(points) is plane.unwrapped(points, points) is plane.on_circles(points) is points
+
+
+@pytest.mark.parametrize(
+    ("side", "unit", "periodic", "told"),
+    [
+        (360, "rad", (True,), "a whole turn, 6.28318531 rad, got [0.0, 360.0]; is it in another unit"),
+        (6.28, "deg", (True,), "a whole turn, 360 deg, got [0.0, 6.28]"),
+        (360, "deg", (True, False), "Box needs 1 values of periodic, got (True, False)"),
+    ],
+)
+def test_a_periodic_side_is_a_whole_turn_in_its_unit(side, unit, periodic, told):
+    with pytest.raises(ValueError, match="periodic") as raised:
+        Box([0], [side], unit=unit, periodic=periodic)
+    assert told in str(raised.value)

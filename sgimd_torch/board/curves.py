@@ -1,6 +1,6 @@
 """The curves of a board: numbers by tag, computed from episodes, evaluations and regions.
 
-behaviour = Behaviour(0.02); behaviour.episode(episode); behaviour.curves(); region_curves(interest_map.regions)
+behaviour = Behaviour(space, 0.02); behaviour.episode(episode); behaviour.curves(); region_curves(interest_map.regions)
 places = Places(benchmark, problem); places.add(outcomes); places.curves(evaluation.errors)
 """
 
@@ -25,6 +25,7 @@ class Behaviour:
     """Curves of what the learner and its teachers do.
 
     Args:
+        space: T.
         tolerance: distance, in the unit of T, at which a goal counts as reached.
         at_once: number of robots that move at once.
 
@@ -34,8 +35,8 @@ class Behaviour:
         failures: number of failed movements so far, by reason.
     """
 
-    def __init__(self, tolerance: float, at_once: int = 1) -> None:
-        self.tolerance, self.own, self._movements = tolerance, OwnGoals(at_once), 0
+    def __init__(self, space: Box, tolerance: float, at_once: int = 1) -> None:
+        self._space, self.tolerance, self.own, self._movements = space, tolerance, OwnGoals(at_once), 0
         self.goals, self.outcomes, self.shown = dict[bytes, Array](), list[Array](), list[Array]()
         self.failures: Counter[str] = Counter()
         self._since: Counter[str] = Counter()  # number of movements since the last point, by tag
@@ -61,9 +62,9 @@ class Behaviour:
         if move.origin != "imitate":
             self.goals[move.goal.tobytes()] = move.goal
         if outcome is not None and move.origin == "imitate":
-            self._imitated.append(float(np.linalg.norm(outcome - move.goal)))
+            self._imitated.append(float(self._space.distance(outcome, move.goal)))
         elif outcome is not None and move.origin != "global":
-            self.own.add(episode.index, move.goal, outcome)
+            self.own.add(episode.index, move.goal, self._space.unwrapped(outcome, move.goal))
 
     def curves(self) -> dict[str, float]:
         """Values of the curves by tag: shares and means since the last call, counts since the first movement."""
@@ -100,15 +101,16 @@ class Places:
     """
 
     def __init__(self, benchmark: Benchmark, problem: Problem) -> None:
+        self._distance = problem.outcomes.distance
         self._goals, self._near = benchmark.goals, benchmark.side / 2
-        self._far = np.maximum(np.linalg.norm(benchmark.goals - problem.rest, axis=1), problem.tolerance)
+        self._far = np.maximum(problem.outcomes.distance(benchmark.goals, problem.rest), problem.tolerance)
         self._tiles = tiles_of(benchmark.goals, problem.outcomes)
         self.missed = np.full(len(benchmark.goals), np.inf)
 
     def add(self, outcomes: Sequence[Array]) -> None:
         """Note new outcomes."""
         for outcome in outcomes:
-            self.missed = np.minimum(self.missed, np.linalg.norm(self._goals - outcome, axis=1))
+            self.missed = np.minimum(self.missed, self._distance(self._goals, outcome))
 
     @property
     def coverage(self) -> float:

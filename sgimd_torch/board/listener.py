@@ -112,7 +112,7 @@ class BoardListener(EventFile, Listener):
         self._config, self._learner, self._seconds, self._curves = parts.config, parts.learner, seconds, curves
         self._space: Box = parts.environment.outcomes
         self._benchmark: Benchmark = parts.benchmark
-        self.behaviour = Behaviour(parts.learner.problem.tolerance, parts.robots)
+        self.behaviour = Behaviour(self._space, parts.learner.problem.tolerance, parts.robots)
         self._places = Places(parts.benchmark, parts.learner.problem)
         self._movements = self._changes = self._failed = 0
         self.trackers: list[Callable[[int, Mapping[str, float]], object]] = []

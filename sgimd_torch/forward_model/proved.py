@@ -86,7 +86,7 @@ class ProvedModel(ModelBased):
         by_model = model_inverse.predict_many(contexts, thetas)
         for row, (prediction, landing, outcome) in enumerate(zip(by_process, by_model, outcomes, strict=True), learnt):
             if prediction is not None:
-                expected, variance = prediction
+                expected, variance, _ = prediction
                 self._tests.append((row, variance, math.dist(expected, outcome), math.dist(landing, outcome)))
         self.model.proved.fill_(self._is_nearly_as_good(len(memory)))
 

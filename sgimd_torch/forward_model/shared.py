@@ -44,6 +44,8 @@ class SharedModel(Trained):
     """
 
     def __init__(self, problem: Problem, module: Callable[..., ForwardModel], **options: Any) -> None:
+        if problem.outcomes.periodic:
+            raise ValueError("a forward model does not know outcomes that wrap; let outcomes be their cosine and sine")
         what = f"module {function_of(module).__name__}"
         self.model = call_checked(what, module, *problem.dims, seed=problem.seed, **options)
         if not isinstance(self.model, ForwardModel):

@@ -11,13 +11,16 @@ at first, and narrows if goals outside the box are missed. If T is hardly larger
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from sgimd_torch.goals.uniform import UniformGoals
+from sgimd_torch.memory import Rows
 from sgimd_torch.parts import Problem
+from sgimd_torch.searches.doubt import Reached
 from sgimd_torch.spaces import Array, check_count
 
 _FEWEST: Final = 21  # least number of exemplars that determine a box; with fewer, goals are uniform in T
@@ -33,6 +36,10 @@ _WIDE_FOR: Final = 250  # number of exemplars up to which the step stays wide
 _STEP_FACTOR: Final = 1.4  # factor of the step after a met goal outside the box; 1.4^(-1/3) after a missed one
 _MEDIAN_FACTOR: Final = 1.1  # factor of the running median error after a larger error; 1 / 1.1 after a smaller one
 _ROUNDING: Final = 1e-9  # largest spread of outcomes that counts as none, relative to the longest side of T
+_HOME: Final = 0.5  # share of the goals in the box of global movements, if T is large and the box of all is larger
+_HOME_STEP: Final = 0.05  # width of the step outside that box, relative to its longest side
+_LARGE_T: Final = 0.2  # geometric mean of the sides of the widened box, relative to T's, below which T is large
+_SMALL_HOME: Final = 0.7  # the same of the box of global movements, relative to the box of all, below which it counts
 _ALL_OF_T: Final = 0.7  # geometric mean of the box's sides, relative to T's, from which on goals are uniform in T
 
 
@@ -62,6 +69,13 @@ class WithinReach(UniformGoals):
         if candidates > 1 and not inverse.says_how_sure:
             problem.remarks.append(f"goals are uniform within reach: {inverse.__name__} does not say how sure it is")
         self._box: Array | None = None  # (2, outcome_dim), the box; None while all outcomes are equal
+        self._home: Array | None = (
+            None  # (2, outcome_dim), box of global movements, if goals lie half of the time there
+        )
+        self._at_home = False  # whether the next goal lies there
+        self._reached = Reached.of(problem)
+        self._wraps = np.array(problem.outcomes.periodic or [False] * problem.outcomes.dim)
+        self._n_confirmed = 0  # number of confirmed outcomes when the box was computed
         self._step = _WIDEST  # width of the step outside the box, relative to the box's longest side
         self._n_updated = 0  # number of exemplars when the box was computed
         self._median_error = 0.0  # running median of the errors of goals in the box
@@ -73,6 +87,7 @@ class WithinReach(UniformGoals):
         Raises:
             ValueError: ``context`` is not one point of C.
         """
+        self._at_home = self._home is not None and bool(self.rng.random() < _HOME)
         goal, inverse = self._within_reach(context), self.problem.inverse
         if self.candidates == 1 or not inverse.says_how_sure or inverse.effects() is not None or not self._n_updated:
             return goal
@@ -83,11 +98,12 @@ class WithinReach(UniformGoals):
         """A goal ``(outcome_dim,)``, uniform in T, or in the box that is widened by the step."""
         goal, space = super().sample(context), self.problem.outcomes
         n = len(self.problem.memory)
-        if n >= max(_FEWEST, _GROWTH * self._n_updated):
+        if n >= max(_FEWEST, _GROWTH * self._n_updated) or len(self._reached.confirmed) > self._n_confirmed:
             self._update_box()
         if self._box is None or self._all_of_t or self.problem.inverse.effects() is not None:
             return goal
-        low, high = self._around(self._box, self._step)
+        home = self._home if self._at_home else None
+        low, high = self._around(self._box, self._step) if home is None else self._around(home, _HOME_STEP)
         moved: Array = low + (goal - space.low) / space.sides * (high - low)
         return moved
 
@@ -104,7 +120,7 @@ class WithinReach(UniformGoals):
             return
         goal, (low, high) = np.asarray(goal, dtype=np.float64), self._box
         beyond = math.dist(goal, np.minimum(np.maximum(goal, low), high))
-        error = math.dist(goal, self.problem.memory.outcomes[-1])
+        error = float(self.problem.outcomes.distance(self.problem.memory.outcomes[-1], goal))
         if beyond == 0:
             median = self._median_error or error
             self._median_error = median * _MEDIAN_FACTOR if error > median else median / _MEDIAN_FACTOR
@@ -115,21 +131,38 @@ class WithinReach(UniformGoals):
 
     def _update_box(self) -> None:
         """Update the box."""
-        memory, space = self.problem.memory, self.problem.outcomes
-        n = self._n_updated = len(memory)
-        rows = np.arange(0, n, 1 + n // _SAMPLED)
-        similar = memory.neighbourhoods(rows, min(_SIMILAR, n // _PER_SIMILAR))
-        means = memory.outcomes[similar].mean(axis=1)
-        box = np.quantile(means, (_TAIL, 1 - _TAIL), axis=0)
-        if np.ptp(box, axis=0).max() > _ROUNDING * space.sides.max():
-            self._box = box
+        n = self._n_updated = len(self.problem.memory)
+        self._n_confirmed = len(self._reached.confirmed)
+        box = self._box_of(np.arange(0, n, 1 + n // _SAMPLED), self._reached.confirmed)
+        self._box = self._box if box is None else box
         if self._box is not None:
-            low, high = self._around(self._box, _WIDEST)
-            share = np.prod((high - low) / space.sides) ** (1 / space.dim)
-            self._all_of_t = bool(share >= _ALL_OF_T)
+            share = self._share_of(self._around(self._box, _WIDEST), self.problem.outcomes.sides)
+            self._all_of_t = share >= _ALL_OF_T
+            self._home = self._box_of(np.array(self._reached.rows, np.intp)) if share < _LARGE_T else None
+        if self._home is not None and self._box is not None:
+            low, high = self._around(self._box, self._step)
+            if self._share_of(self._around(self._home, _HOME_STEP), high - low) >= _SMALL_HOME:
+                self._home = None
+
+    def _box_of(self, rows: Rows, confirmed: Sequence[Array] = ()) -> Array | None:
+        """Box ``(2, outcome_dim)`` around most mean outcomes of movements like those in ``rows``, and around the
+        ``confirmed`` ones; None if there are too few, or all are equal."""
+        memory = self.problem.memory
+        if len(rows) < _FEWEST:
+            return None
+        similar = memory.neighbourhoods(rows, min(_SIMILAR, len(memory) // _PER_SIMILAR))
+        low, high = np.quantile(memory.outcomes[similar].mean(axis=1), (_TAIL, 1 - _TAIL), axis=0)
+        box = np.stack((np.min((low, *confirmed), axis=0), np.max((high, *confirmed), axis=0)))
+        box = np.where(self._wraps, (self.problem.outcomes.low, self.problem.outcomes.high), box)
+        return box if np.ptp(box, axis=0).max() > _ROUNDING * self.problem.outcomes.sides.max() else None
+
+    def _share_of(self, box: tuple[Array, Array], sides: Array) -> float:
+        """Geometric mean of the sides of a box, relative to these ``sides``."""
+        low, high = box
+        return float(np.prod((high - low) / sides) ** (1 / len(sides)))
 
     def _around(self, box: Array, step: float) -> tuple[Array, Array]:
         """Low and high corners of the box that is widened by the step, within T."""
         low, high = box
-        beyond = max(step, _EARLY / self._n_updated) * float((high - low).max())
+        beyond = max(step, _EARLY / self._n_updated) * float(((high - low) * ~self._wraps).max())
         return self.problem.outcomes.clip(low - beyond), self.problem.outcomes.clip(high + beyond)

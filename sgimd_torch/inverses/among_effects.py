@@ -48,6 +48,10 @@ class AmongEffects(Inverse):
         """Prediction of `LocalProcess`, fitted to all movements."""
         return self.of_all.predict(context, theta)
 
+    def unexplained(self, context: Array, theta: Array, outcome: Array) -> float:
+        """That of the process of all movements; 0 if most have no effect."""
+        return self.of_all.unexplained(context, theta, outcome) if self.effects() is None else 0.0
+
     def effects(self) -> Memory | None:
         """Exemplars with an effect, see `Effects`."""
         return self._effects()

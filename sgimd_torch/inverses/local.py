@@ -61,18 +61,19 @@ class LocalInverse(Inverse):
         Raises:
             RuntimeError: the memory is empty.
         """
-        rows = self._most_reliable(context, goal)
-        thetas, outcomes = self.memory.thetas[rows], self.memory.outcomes[rows]
+        known = self.memory.outcomes_around(goal)
+        rows = self._most_reliable(context, goal, known)
+        thetas, outcomes = self.memory.thetas[rows], known[rows]
         theta = gaussian_weights(goal, outcomes, self.width) @ thetas  # eq. (9)
         # A mean lies between the values that it averages; clipping keeps rounding from moving it out of Pi.
         return Estimate(np.clip(theta, thetas.min(axis=0), thetas.max(axis=0)), thetas, outcomes, context)
 
-    def _most_reliable(self, context: Array, goal: Array) -> Rows:
+    def _most_reliable(self, context: Array, goal: Array, outcomes: Array) -> Rows:
         near = near_goal(self.memory, context, goal, self.h_max)  # H of eq. (8), by distances of context and outcome
         padded = self.memory.neighbourhoods(near, self.k_max, self.dist_n)  # -1 fills lists with fewer than k_max rows
         neighbourhoods = [rows[rows >= 0] for rows in padded]  # K_h of eq. (8)
-        spreads = _spreads(self.memory.outcomes, neighbourhoods) ** (2 if self.variance else 1)
-        unreliability = distances_to(self.memory.outcomes[near], goal) + self.alpha * spreads
+        spreads = _spreads(outcomes, neighbourhoods) ** (2 if self.variance else 1)
+        unreliability = distances_to(outcomes[near], goal) + self.alpha * spreads
         return neighbourhoods[int(unreliability.argmin())]
 
 

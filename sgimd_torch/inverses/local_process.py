@@ -3,12 +3,14 @@
 Our addition, not in the paper. Each of the exemplars nearest to the goal has a process of its own, fitted to the
 movements most like it; those that are much alike share one. Candidates are these exemplars, the ends of Gauss-Newton
 steps from them, and the answer of a linear regression. Each candidate has an expected squared error, variance and noise
-included. Where a process predicts the exemplars most like its own badly, both are inflated.
+included. Where a process predicts the exemplars most like its own badly, both are inflated. The movements most like the
+answer have to agree: beside a fold of the map, steps may end on the side that their process does not know.
     inverse = LocalProcess(problem); estimate = inverse(context, goal)
 """
 
 from __future__ import annotations
 
+import math
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -33,9 +35,12 @@ _MOST_ALIKE: Final = 100  # number of exemplars to which a process is fitted
 _NEAR: Final = 10  # number of exemplars in an estimate
 _STARTS: Final = 6  # number of exemplars where steps begin
 _SHARED: Final = 30  # a start among so many movements most like an earlier start shares its process
+_PROOF: Final = 20  # number of movements most like an answer that have to agree with what is expected of it
 _FEW_ALIKE: Final = 40  # number of exemplars that say how unsure an answer would be
 _LITTLE: Final = 1e-3  # least variance of the noise when gross errors are looked for, relative to that of outcomes
 _BULK: Final = 0.2, 0.8  # quantiles between which most outcomes lie
+_BEYOND: Final = 3.0  # deviation, in standard deviations of the noise, that noise does not explain
+_OTHERWISE: Final = 6.0  # deviation of what the movements most like an answer let expect, at which they contradict it
 _FAR: Final = 1e3  # distance from 0, in standard deviations, beyond which inputs are shifted to 0 against rounding
 
 
@@ -81,21 +86,28 @@ class LocalProcess(Inverse):
         near = near_goal(memory, context, goal, _NEAR)
         thetas = memory.thetas[near]
         if self._kernel is None:
-            return Estimate(thetas[0], thetas, memory.outcomes[near], context)
-        known, kernels = self._known(), compiled("sgimd_torch.inverses.kernels")
+            return Estimate(thetas[0], thetas, memory.outcomes_around(goal)[near], context)
+        known, kernels = self._known(goal), compiled("sgimd_torch.inverses.kernels")
         starts = near[:_STARTS]
         alike, process_of = self._alike(starts)
         linear, _ = corrected(memory, alike[:, :ALIKE].copy(), goal)
         question = Question(*map(read_only, (context, goal, starts, alike, process_of, linear)))
         theta, expected, sd = kernels.answer(question, known, self._kernel)
-        return Estimate(theta, thetas, memory.outcomes[near], context, expected, sd)
+        proof = self._predicted(context, theta, known.outcomes, _PROOF)
+        if math.dist(proof.outcomes[0], expected) > _OTHERWISE * sd * math.sqrt(len(goal)):
+            proofs = (theta, proof), (thetas[0], self._predicted(context, thetas[0], known.outcomes, _PROOF))
+            theta, proof = min(proofs, key=lambda answer: _squared_error(answer[1], goal))
+            expected, sd = proof.outcomes[0], math.sqrt(proof.variances[0] + proof.noises[0])
+        return Estimate(theta, thetas, known.outcomes[near], context, expected, sd)
 
     def uncertainty(self, context: Array, goals: Array) -> Array:
         """Standard deviations ``(n,)`` of the outcomes of answers, without noise, from fewer movements than answers."""
         self._catch_up()
         if self._kernel is None:
             return np.zeros(len(goals))
-        known, kernels = self._known(), compiled("sgimd_torch.inverses.kernels")
+        if self.memory.space and len(goals) > 1:  # each goal unwraps the outcomes around itself
+            return np.concatenate([self.uncertainty(context, goals[k : k + 1]) for k in range(len(goals))])
+        known, kernels = self._known(goals[0]), compiled("sgimd_torch.inverses.kernels")
         starts = self.memory.near_each(context, goals)
         alike = self._inputs.nearest(known.inputs[starts], _FEW_ALIKE)
         sds: Array = kernels.uncertainty(*map(read_only, (alike, goals, context)), known, self._kernel)
@@ -111,24 +123,38 @@ class LocalProcess(Inverse):
             process_of.append(len(lists) - 1)
         return np.stack(lists), np.array(process_of)
 
-    def _known(self) -> Movements:
+    def _known(self, goal: Array) -> Movements:
         memory, units = self.memory, (self._units, self._spreads, read_only(self.memory.theta_range))
-        return Movements(self._inputs.keys.rows, memory.thetas, memory.outcomes, *units)
+        return Movements(self._inputs.keys.rows, memory.thetas, memory.outcomes_around(goal), *units)
 
     def predict(self, context: Array, theta: Array) -> Array | None:
         """Expected outcome ``(outcome_dim,)``, from similar movements; None while there are too few exemplars."""
         prediction = self.predict_variance(context, theta)
         return None if prediction is None else prediction[0]
 
-    def predict_variance(self, context: Array, theta: Array) -> tuple[Array, float] | None:
-        """The result of `predict`, and the variance of each dimension, without noise."""
+    def predict_variance(self, context: Array, theta: Array) -> tuple[Array, float, float] | None:
+        """The result of `predict`, and the variances of each dimension: without noise, and of the noise."""
         self._catch_up()
         if self._kernel is None:
-            return (self.memory.outcomes[-1], 0.0) if self._due > _FIRST else None
-        point = (np.concatenate((theta, context)) - self._units[0]) / self._units[1]
-        near = self._inputs.nearest(point[None], _MOST_ALIKE)
-        (outcome,), (variance,), *_ = predictions(self._inputs, self.memory.outcomes, near, point[None], self._kernel)
-        return outcome, float(variance)
+            return (self.memory.outcomes[-1], 0.0, 0.0) if self._due > _FIRST else None
+        around = self.memory.outcomes
+        if self.memory.space:
+            around = self.memory.outcomes_around(around[self.memory.near_policies(context, theta, 1)[0]])
+        predicted = self._predicted(context, theta, around, _MOST_ALIKE)
+        outcome = self.problem.outcomes.wrapped(predicted.outcomes[0])
+        return outcome, float(predicted.variances[0]), float(predicted.noises[0])
+
+    def _predicted(self, context: Array, theta: Array, outcomes: Array, k: int) -> Predictions:
+        """Prediction of one movement by the process of the ``k`` most like it."""
+        point = ((np.concatenate((theta, context)) - self._units[0]) / self._units[1])[None]
+        assert self._kernel is not None
+        return predictions(self._inputs, outcomes, self._inputs.nearest(point, k), point, self._kernel)
+
+    def unexplained(self, context: Array, theta: Array, outcome: Array) -> float:
+        """Distance of an outcome from the predicted one, if beyond three standard deviations of the noise, else 0."""
+        prediction = self.predict_variance(context, theta)
+        off = 0.0 if prediction is None else self.problem.outcomes.distance(prediction[0], outcome)
+        return off if prediction is not None and off > _BEYOND * math.sqrt(len(outcome) * prediction[2]) else 0.0
 
     def fitted(self) -> FittedKernel | None:
         """What predictions are made from; None while there are too few exemplars, or all outcomes are equal."""
@@ -173,7 +199,7 @@ class LocalProcess(Inverse):
     def _fit_to(self, n: int, far: float) -> None:
         self._kernel = None
         unscaled = np.concatenate((self.memory.thetas[:n], self.memory.contexts[:n]), axis=1)
-        outcomes = self.memory.outcomes[:n]
+        outcomes = self.memory.on_circles[:n]
         origin = np.where(np.abs(unscaled[0]) > far * _spreads(unscaled), unscaled[0], 0.0)
         self._spreads = read_only(_spreads(unscaled - origin))
         if not np.ptp(outcomes, axis=0).any():
@@ -217,6 +243,12 @@ class LocalProcess(Inverse):
         unscaled = np.concatenate((self.memory.thetas[first:], self.memory.contexts[first:]), axis=1)
         scaled: Array = (unscaled - self._units[0]) / self._units[1]
         return scaled
+
+
+def _squared_error(predicted: Predictions, goal: Array) -> float:
+    """Expected squared distance of a predicted movement from a ``goal``."""
+    variance = float(predicted.variances[0] + predicted.noises[0])
+    return math.dist(predicted.outcomes[0], goal) ** 2 + len(goal) * variance
 
 
 def plausible(outcomes: Array, space: Box) -> tuple[Array, Array]:

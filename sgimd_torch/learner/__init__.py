@@ -302,7 +302,7 @@ class Learner:
             raise RuntimeError("add() needs the outcome of the last movement first; was tell() forgotten?")
         context = read_only(check_point("context", context, self.memory.context_dim))
         theta = read_only(self.problem.policies.check("theta", check_point("theta", theta, self.memory.theta_dim)))
-        outcome = read_only(self.memory.check_outcome(theta, outcome))
+        outcome = read_only(self.problem.outcomes.wrapped(self.memory.check_outcome(theta, outcome)))
         self._report_new()
         self._remember(context, theta, outcome)
         self._publish(Event(Kind.ADDED, context, theta, outcome=outcome))
@@ -406,7 +406,7 @@ class Learner:
         if isinstance(outcome, Failure):
             return outcome
         if isinstance(move, Move) and outcome is not None:
-            return self.memory.check_outcome(move.theta, outcome)
+            return self.problem.outcomes.wrapped(self.memory.check_outcome(move.theta, outcome))
         if isinstance(move, Move) or outcome is not None:
             raise ValueError(f"a movement has an outcome or a Failure, a rest has None; got {outcome} for {move}")
         return move

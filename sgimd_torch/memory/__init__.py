@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from sgimd_torch.memory.growing import Growing
 from sgimd_torch.memory.neighbours import Flat, Graph, Rows, Scan
-from sgimd_torch.spaces import Array, check_point
+from sgimd_torch.spaces import Array, Box, check_point, read_only
 
 __all__ = ["FlatMemory", "Memory", "Neighbours", "Rows", "ScanMemory"]
 
@@ -47,6 +47,8 @@ class Memory:
         ValueError: a dimension is out of range.
     """
 
+    space: Box | None = None  # T, if outcomes wrap
+
     def __init__(self, context_dim: int, theta_dim: int, outcome_dim: int) -> None:
         if context_dim < 0 or theta_dim < 1 or outcome_dim < 1:
             raise ValueError(
@@ -59,8 +61,9 @@ class Memory:
     def _begin(self) -> None:
         dims = self.context_dim, self.theta_dim, self.outcome_dim
         self._contexts, self._thetas, self._outcomes = map(Growing, dims)
+        self._on_circles = Growing(dims[2] + sum(self.space.periodic)) if self.space else self._outcomes
         # A key is a context followed by an outcome or by a theta; without contexts, outcomes and thetas are the keys.
-        self._by_outcome = self.index(Growing(dims[0] + dims[2]) if dims[0] else self._outcomes)
+        self._by_outcome = self.index(Growing(dims[0] + self._on_circles.dim) if dims[0] else self._on_circles)
         self._by_theta = self.index(Growing(dims[0] + dims[1]) if dims[0] else self._thetas)
         self._range = np.stack((np.full(dims[1], np.inf), np.full(dims[1], -np.inf)))
 
@@ -85,6 +88,15 @@ class Memory:
     def outcomes(self) -> Array:
         """``(n, outcome_dim)`` read-only."""
         return self._outcomes.rows
+
+    @property
+    def on_circles(self) -> Array:
+        """Outcomes, see `Box.on_circles`; the ``outcomes`` themselves if none wraps."""
+        return self._on_circles.rows
+
+    def outcomes_around(self, goal: Array) -> Array:
+        """``(n, outcome_dim)``, the outcomes, unwrapped around a ``goal`` ``(outcome_dim,)``."""
+        return read_only(self.space.unwrapped(self.outcomes, goal)) if self.space else self.outcomes
 
     @property
     def theta_range(self) -> Array:
@@ -116,10 +128,12 @@ class Memory:
         """Rows ``(min(k, n),)`` whose contexts and outcomes lie nearest to ``context`` and ``goal`` ``(outcome_dim,)``,
         nearest first; of equally near rows, the oldest first."""
         goal = check_point("goal", goal, self.outcome_dim, "was a theta passed instead?")
+        goal = self.space.on_circles(goal) if self.space else goal
         return self._by_outcome.nearest(self._key(context, goal)[None], k)[0]
 
     def near_each(self, context: Array, goals: Array) -> Rows:
         """Row of the exemplar whose context and outcome lie nearest to ``context`` and each of ``goals``, ``(n,)``."""
+        goals = self.space.on_circles(goals) if self.space else goals
         keys = np.concatenate((np.tile(context, (len(goals), 1)), goals), axis=1) if self.context_dim else goals
         return self._by_outcome.nearest(keys, 1)[:, 0]
 
@@ -135,9 +149,11 @@ class Memory:
         with -1 where there are fewer; a row is its own neighbour."""
         return self._by_theta.nearest(self._by_theta.keys.rows[rows], k, within)
 
-    def copy(self) -> Self:
-        """A memory with copies of the exemplars."""
-        memory = self.empty()
+    def copy(self, space: Box | None = None) -> Self:
+        """A memory with copies of the exemplars; in a ``space`` T whose outcomes wrap, neighbours are found across."""
+        memory = copy(self)
+        memory.space = self.space if space is None else space if space.periodic else None
+        memory._begin()
         memory.extend(self.contexts, self.thetas, self.outcomes)
         return memory
 
@@ -151,6 +167,8 @@ class Memory:
         """Remember exemplars ``(n, dim)`` that another memory, or the learner, has checked."""
         for table, rows in ((self._contexts, contexts), (self._thetas, thetas), (self._outcomes, outcomes)):
             table.append(rows)
+        if self.space:
+            self._on_circles.append(outcomes := self.space.on_circles(outcomes))
         if len(thetas):
             lowest, highest = self._range
             self._range = np.array((np.minimum(lowest, thetas.min(axis=0)), np.maximum(highest, thetas.max(axis=0))))
@@ -182,7 +200,7 @@ class ScanMemory(Memory):
 MakeMemory: TypeAlias = Callable[[int, int, int], Memory]
 
 
-def memory_for(memory: Memory | MakeMemory, dims: tuple[int, int, int]) -> Memory:
+def memory_for(memory: Memory | MakeMemory, dims: tuple[int, int, int], outcomes: Box | None = None) -> Memory:
     """A memory for a learner with these dimensions: a new one, or a copy of a ``memory`` to start from.
 
     Raises:
@@ -199,4 +217,4 @@ def memory_for(memory: Memory | MakeMemory, dims: tuple[int, int, int]) -> Memor
         from sgimd_torch.memory.trial import check_memory  # few users bring a memory
 
         check_memory(memory)
-    return memory.copy()
+    return memory.copy(outcomes)

@@ -91,7 +91,7 @@ def open_run(parts: RunParts, *, resume: bool) -> tuple[Record, list[str]]:
         "robots": parts.robots,
         "rooms": rooms_of((part.kind, part.word) for part in config.chosen.values() if part.kind != "hook"),
         "ended_early": None,
-        "spaces": {n: [b.low.tolist(), b.high.tolist(), b.names, b.unit] for n, b in spaces.items()},
+        "spaces": {n: [b.low.tolist(), b.high.tolist(), b.names, b.unit, b.periodic] for n, b in spaces.items()},
     }
     dims = parts.learner.problem.dims
     if len(os.fsencode(path.resolve())) > LONGEST:

@@ -126,8 +126,9 @@ class Run:
             & np.isfinite(self.outcomes[:, 0])
             & ~np.isin(self.origin, ("imitate", "global"))
         )
+        outcomes = self.spaces["outcomes"].unwrapped(self.outcomes, self.goals)
         for row in np.flatnonzero(own).tolist():
-            own_goals.add(row, self.goals[row], self.outcomes[row])
+            own_goals.add(row, self.goals[row], outcomes[row])
         return own_goals
 
     def chosen_goals(self) -> Array:

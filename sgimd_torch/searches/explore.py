@@ -11,7 +11,8 @@ from typing import Final
 import numpy as np
 
 from sgimd_torch.parts import Explore, Inverse, Problem
-from sgimd_torch.spaces import Array, check_count
+from sgimd_torch.searches.doubt import Doubt, Stuck
+from sgimd_torch.spaces import Array, Estimate, check_count
 
 _ENOUGH: Final = 16  # least number of exemplars with an effect from which an inverse model can learn
 _LEAST_SHARE: Final = 0.05  # least probability of a movement that is uniform in Pi
@@ -22,6 +23,7 @@ _SIMILAR: Final = 10  # number of movements with an effect, in the most similar 
 _FIRST_WIDTH: Final = 0.1  # standard deviation of the first variations, relative to the sides of Pi
 _NARROWEST: Final = 0.03  # least standard deviation
 _WIDEST: Final = 0.3  # greatest standard deviation
+_LEAVE: Final = 0.5  # probability of a global movement at a goal where the learner is stuck
 _FACTOR: Final = 1.15  # factor by which the standard deviation changes after each variation
 
 
@@ -64,7 +66,7 @@ class Returning(Explore):
             raise ValueError(f"uniform must be a share of movements, from 0 to 1, got {uniform}")
         self.width = _FIRST_WIDTH
         self._varied: list[Array] = []  # variations whose effect is not known yet
-        self._seen = 0  # number of exemplars at the last call
+        self._doubt, self._stuck = Doubt(problem), Stuck(problem)
         inverse = type(problem.inverse)
         if inverse.effects is Inverse.effects:
             problem.remarks.append(f"exploration does not look for effects: {inverse.__name__} does not report them")
@@ -72,14 +74,32 @@ class Returning(Explore):
     def share(self) -> float:
         """Probability of a global movement; 1, too, if effects are rare and fewer than 16 movements had one."""
         n = len(self.problem.memory)
-        if n < self.first:
+        if n < self.first or len(self._doubt):
             return 1.0
         uniform = min(max(self.first / n, _LEAST_SHARE), _GREATEST_SHARE) if n else 1.0
         effective = self.problem.inverse.effects()
         return uniform if effective is None else uniform / _ANYWHERE if len(effective) >= _ENOUGH else 1.0
 
+    def instead(self, estimate: Estimate, goal: Array) -> bool:
+        """Half of the time, if goals near this one were answered again and again by movements known to miss them."""
+        return self._stuck(estimate, goal) and bool(self.rng.random() < _LEAVE)
+
+    def add(self, theta: Array) -> None:
+        """Doubt the outcome of a movement; widen or narrow variations."""
+        effective = self.problem.inverse.effects()
+        if effective is None:
+            self._doubt.add(theta)
+        for k, varied in enumerate(self._varied):
+            if np.array_equal(varied, theta):
+                del self._varied[k]
+                has_effect = effective is not None and bool(self.problem.policies.same(effective.thetas, theta).any())
+                self.width = float(np.clip(self.width * _FACTOR ** (1 if has_effect else -1), _NARROWEST, _WIDEST))
+                break
+
     def __call__(self, context: Array) -> Array:
         """The next movement ``(theta_dim,)``."""
+        if len(self._doubt):
+            return self._doubt.next()
         effective, policies = self.problem.inverse.effects(), self.problem.policies
         anywhere = policies.sample(self.rng)
         if effective is None:
@@ -87,11 +107,6 @@ class Returning(Explore):
             is_uniform = len(self.problem.memory) >= self.first or self.rng.random() < self.uniform
             far = 1.0 if is_uniform else self.rng.random() ** min(1.0, policies.dim / _WIDE)
             return policies.clip(middle + far * (anywhere - middle))
-        if len(self.problem.memory) > self._seen:  # several robots may move at once
-            for theta in self._varied:
-                has_effect = bool(policies.same(effective.thetas, theta).any())
-                self.width = float(np.clip(self.width * _FACTOR ** (1 if has_effect else -1), _NARROWEST, _WIDEST))
-            self._varied, self._seen = [], len(self.problem.memory)
         if not len(effective) or self.rng.random() < _ANYWHERE:
             return anywhere
         order = np.linalg.norm(effective.contexts - context, axis=1).argsort(kind="stable")

@@ -40,9 +40,12 @@ def evaluation(errors):
     return Evaluation(errors, nothing, nothing, np.full(len(errors), 0.01), nothing, errors < 0, unknown)
 
 
+PLANE = Box.cube(-2, 2, 2)
+
+
 def behaviour_of(*movements, at_once=1):
     """The behaviour after these movements, each a tuple (goal, outcome, origin, demonstration); the last may lack."""
-    behaviour = Behaviour(0.02, at_once)
+    behaviour = Behaviour(PLANE, 0.02, at_once)
     for index, told in enumerate(movements):
         behaviour.episode(movement(index, *told))
     return behaviour
@@ -81,7 +84,7 @@ def test_shares_of_kinds_of_movements_sum_to_one_and_a_kind_that_was_seen_keeps_
 
 
 def test_requests_are_counted_by_strategy():
-    behaviour = Behaviour(0.02)
+    behaviour = Behaviour(PLANE, 0.02)
     for index, (strategy, reply) in enumerate([("imitate ann", "shown"), ("imitate ben", "again"), ("", ""), ("", "")]):
         request = Request(strategy[-3:], GOAL, strategy) if strategy else None
         behaviour.episode(Episode(index, np.zeros(0), Move(np.zeros(1), GOAL, "local"), FAR, None, request, reply))

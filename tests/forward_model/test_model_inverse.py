@@ -18,7 +18,7 @@ from sgimd_torch.memory import Memory
 from sgimd_torch.options.signature import help_of, options_of
 from sgimd_torch.parts import Problem
 from sgimd_torch.spaces import Box, stream
-from worlds import NO_CONTEXT, executed
+from worlds import NO_CONTEXT, executed, problem
 
 
 def answers(inverse, goals):
@@ -203,3 +203,9 @@ def test_in_thousandths_of_the_unit_it_trusts_and_answers_the_same(proved):
     assert thousand.trusted == proved.trusted
     goals = stream(6, "goals").uniform(-0.9, 0.9, (20, 2))
     np.testing.assert_allclose(answers(proved, goals), answers(thousand, 1000.0 * goals), atol=5e-3)  # float32
+
+
+def test_a_model_does_not_know_outcomes_that_wrap(memory):
+    wrapping = problem(memory=memory, outcomes=Box([-1, 0], [1, 360], periodic=(False, True)))
+    with pytest.raises(ValueError, match="does not know outcomes that wrap; let outcomes be their cosine and sine"):
+        model_of(wrapping)

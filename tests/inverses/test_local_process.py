@@ -150,6 +150,13 @@ def test_where_several_families_of_movements_lead_to_a_place_it_beats_the_neares
     assert process < 0.6 * min(nearest, linear)
 
 
+def test_an_answer_beside_a_fold_does_not_land_on_its_other_side() -> None:
+    task, toy = two_elbows(), two_elbows().environment
+    inverse, goals = LocalProcess(played(toy, 600, seed=1, noise=0.01)), task.benchmark().goals
+    missed = [toy.effect(NO_CONTEXT, inverse(NO_CONTEXT, goal).theta) - goal for goal in goals]
+    assert np.linalg.norm(missed, axis=1).max() < 0.2
+
+
 def test_in_a_context_that_never_came_it_beats_the_nearest() -> None:
     toy = toss().environment
     given, asked = played(toy, 200), played(toy, 40, seed=1).memory

@@ -193,7 +193,9 @@ def test_variations_are_wider_the_more_often_the_effect_persists():
         for row in range(40):
             memory.add([], rng.uniform(size=3), [0.0 if row else 1.0])
         for _ in range(30):
-            memory.add([], explore(NO_CONTEXT), [rng.uniform(1, 2) if persists else 0.0])
+            theta = explore(NO_CONTEXT)
+            memory.add([], theta, [rng.uniform(1, 2) if persists else 0.0])
+            explore.add(theta)
         widths.append(explore.width)
     assert widths[0] > 5 * widths[1]
 
@@ -202,10 +204,10 @@ def test_practice_fetches_a_ball_that_it_would_not_fetch_if_all_movements_counte
     robot, errors = fetch().environment, []
     goals = toy_benchmark(robot, 0.1).goals[::4]
     for parts in ({}, {"inverse": LocalProcess}):
-        learner = practice(robot, 1, **parts)
-        for _ in run(learner, robot, 1, movements=400):
+        learner = practice(robot, 3, **parts)
+        for _ in run(learner, robot, 3, movements=400):
             pass
-        errors.append(evaluate(learner.inverse, robot, goals, 1, 400, repeats=0).mean_error)
+        errors.append(evaluate(learner.inverse, robot, goals, 3, 400, repeats=0).mean_error)
     assert errors[0] < 0.3 * errors[1]
 
 

@@ -139,7 +139,7 @@ def _execute(parts: RunParts, answers: Sequence[Answer], stopping: Stopping) -> 
         if isinstance(reached, Failure):
             yield f"goal {_text(answer['goal'])}: {reached.reason}"
             reached = np.full(robot.outcomes.dim, np.nan)
-        answer |= {"reached": reached, "error": np.array([math.dist(reached, answer["goal"])])}
+        answer |= {"reached": reached, "error": np.array([robot.outcomes.distance(reached, answer["goal"])])}
 
 
 def _read(path: Path, box: Box) -> list[list[float]]:

@@ -44,10 +44,14 @@ def can_notice(learner: Learner, prior: Memory | None) -> bool:
         why = f"{type(learner.inverse).__name__} does not say how sure it is"
     elif learner.problem.trained:
         why = "a forward model cannot begin again"
+    elif learner.problem.outcomes.periodic:
+        why = "a calibration does not know outcomes that wrap"
     else:
         return True
     if prior is not None:
-        needed = "an inverse model that says how sure it is, such as process, and no forward model"
+        needed = (
+            "an inverse model that says how sure it is, such as process, no forward model, and no outcome that wraps"
+        )
         raise ValueError(f"prior (--begin-with) needs {needed}, but {why}; was another --inverse meant?")
     learner.problem.remarks.append(f"changes of the robot are not noticed: {why}")
     return False

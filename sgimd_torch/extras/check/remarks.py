@@ -20,6 +20,8 @@ EQUAL: Final = 50  # number of equal outcomes that are told after others
 NOISY: Final = 1.5  # standard deviation of outcomes, as a multiple of their noise, up to which only noise moves them
 MANY: Final = 0.2  # share of outcomes far outside T from which on they are no exceptions
 CLIPPED: Final = 0.1  # share of outcomes on the border of T that is told
+AN_END: Final = 0.1  # part of a side of T that counts as its end
+AT_ENDS: Final = 0.03  # share of outcomes at each end from which on an outcome may wrap
 NARROW: Final = 0.03  # share of the volume of T that outcomes span; less is told
 
 
@@ -59,6 +61,14 @@ def remarks_on(robot: Environment, outcomes: Array) -> dict[str, str]:
             "let execute() fail there, or return where it ended"
         )
     low, high = outcomes.min(axis=0), outcomes.max(axis=0)
+    ends = np.minimum(
+        (outcomes < space.low + AN_END * space.sides).mean(axis=0),
+        (outcomes > space.high - AN_END * space.sides).mean(axis=0),
+    )
+    turn = np.isclose(space.sides, 2 * np.pi, rtol=0.01) | np.isclose(space.sides, 360, rtol=0.01)
+    if not space.periodic and (wraps := turn & (ends >= AT_ENDS)).any():
+        names = ", ".join(space.axis(k) for k in np.flatnonzero(wraps).tolist())
+        told["wraps"] = f"{names} spans a whole turn, up to both ends: if it wraps, say so by Box(..., periodic=...)"
     spans = " x ".join(f"[{a:.3g}, {b:.3g}]" for a, b in zip(low, high, strict=True))
     share = float(np.prod((high - low) / space.sides))
     if not space.contains(outcomes).any():

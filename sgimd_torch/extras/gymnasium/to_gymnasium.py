@@ -67,14 +67,14 @@ class ToGymnasium(gymnasium.Env[Any, Any]):
         theta = check_point("action", np.asarray(action, dtype=np.float64), self.environment.policies.dim)
         outcome = self.environment.execute(self._context.copy(), theta, self.np_random)
         observation = self._observation(outcome)
-        distance = float(np.linalg.norm(outcome - self._goal))
+        distance = float(self.environment.outcomes.distance(outcome, self._goal))
         info = {"is_success": distance <= max(self.environment.outcome_noise, 0.02)}
         self._goal = None
         return observation, -distance, True, False, info
 
     def compute_reward(self, achieved_goal: ArrayLike, desired_goal: ArrayLike, info: Any = None) -> Array:
         """Minus the distances ``(...)`` between the two goals ``(..., outcome_dim)``, for hindsight relabelling."""
-        return -np.linalg.norm(np.subtract(achieved_goal, desired_goal), axis=-1)
+        return -self.environment.outcomes.distance(np.asarray(achieved_goal), np.asarray(desired_goal))
 
     def _observation(self, outcome: Array) -> Observation:
         assert self._goal is not None

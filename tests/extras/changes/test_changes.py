@@ -23,9 +23,9 @@ from sgimd_torch.memory.exemplars import Exemplars
 from sgimd_torch.parts import Inverse
 from sgimd_torch.record.replay import load_life, save_life
 from sgimd_torch.session import run
-from sgimd_torch.spaces import Failure, stream
+from sgimd_torch.spaces import Box, Failure, stream
 from sgimd_torch.teachers import PeriodicTeacher
-from worlds import NO_CONTEXT, demonstrate, demonstrations, executed, last_posture, problem
+from worlds import NO_CONTEXT, Boxes, demonstrate, demonstrations, executed, last_posture, problem
 
 ARM = PlanarArm(3)
 GOALS = np.array([[0.3, 0.4], [-0.4, 0.5], [0.6, -0.1], [0.1, -0.7]])
@@ -284,3 +284,10 @@ def test_a_users_memory_stays_what_it_is_when_the_learner_begins_again():
     again = learner.watcher.begin_again(Exemplars.of(learner.memory, slice(10)), 40)
     assert type(again.memory) is type(again.problem.memory) is Own
     assert type(practice(ARM, 0, memory=Own, prior=learner.memory).problem.memory) is Own
+
+
+def test_a_robot_whose_outcomes_wrap_is_not_watched_and_that_is_said():
+    heading = Boxes(Box.cube(0, 1, 0), Box.cube(0, 1, 2), Box([0], [360], periodic=(True,)), np.zeros(1))
+    assert "changes of the robot are not noticed: a calibration does not know outcomes that wrap" in (
+        practice(heading, 0, watch=changes).problem.remarks
+    )

@@ -72,3 +72,14 @@ def test_a_dead_sensor_is_told_by_the_check_once_by_a_run_and_by_all_that_shows_
         assert f"runs/random/seed-000: the last 150 {said}\n" in capsys.readouterr().err
     assert command(_call, ["report", "runs", "--out", "page.html"]) == 0
     assert f"the last 150 {said}" in (own / "page.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("degrees", "periodic", "is_told"), [(360, (), True), (360, (True, False), False), (300, (), False)]
+)
+def test_an_outcome_that_spans_a_whole_turn_may_wrap(degrees, periodic, is_told):
+    space = Box([0, -1], [degrees, 1], ("heading", "y"), periodic=periodic)
+    told = remarks_on(
+        Boxes(Box.cube(0, 1, 0), Box.cube(0, 1, 2), space, np.zeros(2), 0.01), (SPREAD + 1) * [180, 1] - [0, 1]
+    )
+    assert ("heading spans a whole turn, up to both ends" in told.get("wraps", "")) == is_told
