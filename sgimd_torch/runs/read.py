@@ -168,7 +168,7 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         derived: dict[str, Any] = {table: _columns(record, table) for table in DERIVED}
         n = record.movements
     numbers = np.flatnonzero(arrays["forgotten"]).tolist()
-    forgotten = [f"taken back: the outcomes of movements {as_spans(numbers)}"] if numbers else []
+    forgotten = [f"taken back: movement {as_spans(numbers)}"] if numbers else []
     evaluated = derived["evaluations"]["movements"]
     is_empty = not demonstrations and not np.isfinite(arrays["outcomes"]).any()  # an empty memory is not evaluated
     with record.translated_errors():

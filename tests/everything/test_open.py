@@ -317,6 +317,11 @@ def test_a_change_is_said_recorded_and_reported_once(files, tmp_path, capsys):
     assert command(main, [*words, "230", "--resume"]) == 0
     assert read_run(tmp_path / "practice/seed-000").changes == [change]
     assert said not in capsys.readouterr().err
+    assert command(forget.main, [str(tmp_path / "practice/seed-000"), "--movements=20", "--trust"]) == 0
+    assert said in capsys.readouterr().err  # it was looked for again
+    assert command(main, [*words, "240", "--resume"]) == 0
+    assert len(read_run(tmp_path / "practice/seed-000").changes) == 1
+    assert said not in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures("answered_from_memory")

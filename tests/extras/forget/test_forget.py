@@ -82,7 +82,7 @@ def test_the_record_keeps_the_exemplars_and_all_views_leave_them_out(forgotten, 
     assert command(ask, [str(forgotten), "--goal", "0.3,0.4"]) == 0
     assert command(report, [str(forgotten)]) == 0
     for said in (capsys.readouterr().err, (forgotten / "report.html").read_text()):
-        assert "taken back: the outcomes of movements 3,40-42" in said
+        assert "taken back: movement 3,40-42" in said
 
 
 def test_the_learner_of_an_earlier_time_still_knew_them(forgotten):
