@@ -344,7 +344,7 @@ class Learner:
         if self.problem.trained:
             raise ValueError("a forward model cannot forget what it was trained on; begin a new run")
         if self.beginning is None:
-            raise ValueError("this learner cannot forget, as it cannot begin again: build it by algorithms.learner_of()")
+            raise ValueError("this learner cannot forget, as it cannot begin again: use algorithms.learner_of()")
         self._report_new()
         self._publish(Event(Kind.FORGOTTEN, reply=as_spans(numbers)), *self.take_back(numbers))
 
