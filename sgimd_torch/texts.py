@@ -6,9 +6,11 @@ NUMBER.of("0.5"); VALUES["tuple[int, ...] | None"].of("1,2"); did_you_mean("unif
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Collection, Iterable
 from difflib import get_close_matches
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -56,6 +58,16 @@ def _truth(text: str) -> bool:
     return bool(("false", "true").index(text))
 
 
+def _spans(text: str) -> tuple[range, ...]:
+    spans = list[range]()
+    for part in text.split(","):
+        ends = re.fullmatch(r"(\d+)(?:-(\d+))?", part.strip(), re.ASCII)  # Python reads the digits of all scripts
+        if ends is None or not (span := range(int(ends[1]), int(ends[2] or ends[1]) + 1)):
+            raise ValueError
+        spans.append(span)
+    return tuple(spans)
+
+
 def _or_null(read: Callable[[str], Any], text: str) -> Any:
     return None if text == "null" else read(text)
 
@@ -64,6 +76,7 @@ _FLOAT, _INT = partial(_number, float), partial(_number, int)  # values of a Con
 NUMBER: Final = Values("a number", _FLOAT)
 COUNT: Final = Values("a whole number", _INT)
 NUMBERS: Final = Values("numbers with commas", partial(_several, _FLOAT, None))
+SPANS: Final = Values("like 5, 0-19 or 0,3,7-9", _spans)
 _SIMPLE: Final = {
     "float": NUMBER,
     "int": COUNT,
@@ -89,6 +102,22 @@ def as_text(value: Any) -> str:
     if isinstance(value, tuple):
         return ",".join(map(as_text, value)) or "[]"
     return json.dumps(value) if value is None or isinstance(value, bool) else str(value)
+
+
+def as_spans(numbers: Iterable[int]) -> str:
+    """Whole numbers, in order, as a user types them, such as "12,40-45"; `numbers_in` is the inverse."""
+    ends = list[list[int]]()
+    for number in numbers:
+        if ends and number == ends[-1][1] + 1:
+            ends[-1][1] = number
+        else:
+            ends.append([number, number])
+    return ",".join(f"{first}-{last}" if first < last else str(first) for first, last in ends)
+
+
+def numbers_in(spans: str) -> list[int]:
+    """All whole numbers of a text such as "12,40-45"."""
+    return list(chain(*SPANS.of(spans)))
 
 
 def unknown_name_error(what: str, word: str, known: Collection[str], also: str = "") -> ValueError:

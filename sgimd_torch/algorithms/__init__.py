@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final, TypeAlias
 
-from sgimd_torch.learner import Learner, Watcher
+from sgimd_torch.learner import Beginning, Learner, Watcher
 from sgimd_torch.memory import MakeMemory, Memory
 from sgimd_torch.memory.exemplars import Exemplars
 from sgimd_torch.parts import Inverse, Problem
@@ -28,8 +28,14 @@ def nobody(begin: Begin, learner: Learner, prior: Memory | None) -> Watcher | No
 usual_watcher: Final = Usual("watch", "none", nobody)
 
 
-def watched(begin: Begin, seed: int, memory: Memory | MakeMemory, prior: Memory | None, watch: MakeWatcher) -> Learner:
-    """The learner that ``begin`` builds; where its robot changes, ``watch`` makes it begin again.
+def learner_of(
+    begin: Begin,
+    seed: int,
+    memory: Memory | MakeMemory,
+    prior: Memory | None = None,
+    watch: MakeWatcher = nobody,
+) -> Learner:
+    """The learner that ``begin`` builds. It begins again when ``watch`` finds a change of its robot, and to forget.
 
     Args:
         begin: function that builds the learner.
@@ -46,5 +52,6 @@ def watched(begin: Begin, seed: int, memory: Memory | MakeMemory, prior: Memory 
             raise ValueError("give memory, exemplars of this robot, or prior, exemplars of another robot; got both")
         memory = Exemplars.of(prior).memory_like(memory(prior.context_dim, prior.theta_dim, prior.outcome_dim))
     learner = begin(seed, memory)
-    learner.watcher = watch(begin, learner, prior)
+    learner.beginning = Beginning(begin, learner.memory.copy(), lambda: watch(begin, learner, prior))
+    learner.watcher = learner.beginning.watch()
     return learner

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, Final
 
-from sgimd_torch.algorithms import MakeInverse, MakeWatcher, nobody, watched
+from sgimd_torch.algorithms import MakeInverse, MakeWatcher, learner_of, nobody
 from sgimd_torch.calls import with_keywords_of
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.goals.interest_map import InterestMap
@@ -46,8 +46,12 @@ def random_exploration(
     environment: Environment, seed: int, *, inverse: MakeInverse = LocalProcess, memory: Memory | MakeMemory = Memory
 ) -> Learner:
     """Uniform movements: random exploration."""
-    problem = Problem(environment, seed, memory, inverse=inverse)
-    return Learner(problem, Babble(problem))
+
+    def begin(seed: int, memory: Memory | MakeMemory) -> Learner:
+        problem = Problem(environment, seed, memory, inverse=inverse)
+        return Learner(problem, Babble(problem))
+
+    return learner_of(begin, seed, memory)
 
 
 def observation(
@@ -59,8 +63,12 @@ def observation(
     memory: Memory | MakeMemory = Memory,
 ) -> Learner:
     """Learning by observation: remembers each demonstration and never moves."""
-    problem = Problem(environment, seed, memory, inverse=inverse)
-    return Learner(problem, Rest(problem), social=Remember(problem), correspondence=correspondence)
+
+    def begin(seed: int, memory: Memory | MakeMemory) -> Learner:
+        problem = Problem(environment, seed, memory, inverse=inverse)
+        return Learner(problem, Rest(problem), social=Remember(problem), correspondence=correspondence)
+
+    return learner_of(begin, seed, memory)
 
 
 def imitation(
@@ -84,9 +92,13 @@ def imitation(
         inverse: inverse model.
         memory: memory, or exemplars to start from.
     """
-    problem = Problem(environment, seed, memory, inverse=inverse)
-    mimic = Mimic(problem, repeats=None, epsilon=epsilon, exact_first=exact_first)
-    return Learner(problem, Rest(problem), social=mimic, correspondence=correspondence)
+
+    def begin(seed: int, memory: Memory | MakeMemory) -> Learner:
+        problem = Problem(environment, seed, memory, inverse=inverse)
+        mimic = Mimic(problem, repeats=None, epsilon=epsilon, exact_first=exact_first)
+        return Learner(problem, Rest(problem), social=mimic, correspondence=correspondence)
+
+    return learner_of(begin, seed, memory)
 
 
 @with_keywords_of(GoalBabbling, goals=InterestMap, search=NelderMead)
@@ -116,7 +128,7 @@ def sagg_riac(
         problem = Problem(environment, seed, memory, inverse=inverse)
         return Learner(problem, GoalBabbling(problem, **parts))
 
-    return watched(begin, seed, memory, prior, watch)
+    return learner_of(begin, seed, memory, prior, watch)
 
 
 @with_keywords_of(GoalBabbling, goals=InterestMap, search=NelderMead)
@@ -153,7 +165,7 @@ def sgim_d(
         problem.autonomous = GoalBabbling(problem, **parts)
         return Learner(problem, problem.autonomous, social=Social.of(social, problem), correspondence=correspondence)
 
-    return watched(begin, seed, memory, prior, watch)
+    return learner_of(begin, seed, memory, prior, watch)
 
 
 @with_keywords_of(sagg_riac, inverse=LocalInverse, **LETTER)

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, Final
 
-from sgimd_torch.algorithms import MakeInverse, MakeWatcher, usual_watcher, watched
+from sgimd_torch.algorithms import MakeInverse, MakeWatcher, learner_of, usual_watcher
 from sgimd_torch.calls import with_keywords_of
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.goals.within_reach import WithinReach
@@ -50,7 +50,7 @@ def practice(
         problem = Problem(environment, seed, memory, inverse=inverse)
         return Learner(problem, GoalBabbling(problem, **parts))
 
-    return watched(begin, seed, memory, prior, watch)
+    return learner_of(begin, seed, memory, prior, watch)
 
 
 @with_keywords_of(GoalBabbling, **PRACTICE)
@@ -76,4 +76,4 @@ def practice_taught(
         problem.autonomous = GoalBabbling(problem, **parts)  # its goal model is told of demonstrated goals
         return Learner(problem, problem.autonomous, social=Social.of(social, problem), correspondence=correspondence)
 
-    return watched(begin, seed, memory, prior, watch)
+    return learner_of(begin, seed, memory, prior, watch)

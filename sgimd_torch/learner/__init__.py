@@ -4,7 +4,7 @@ Algorithm 1 of Nguyen & Oudeyer (2014), rebuilt. All five learners of the paper 
 autonomous and a social one. The caller owns the loop: ``move = learner.ask(context)``, execute it,
 ``learner.tell(outcome)``. ``learner.watch(demonstration)`` shows a demonstration. ``learner.request(context)``, before
 ``ask``, returns the request of a learner that asks teachers. ``learner.inverse(context, goal).theta`` is the movement
-for a goal. ``learner.listeners.append(print)`` prints every event.
+for a goal. ``learner.forget([12])`` takes movement 12 back. ``learner.listeners.append(print)`` prints every event.
 
 Several robots move at once by ``moves = learner.ask_many(contexts)`` and ``learner.tell_many(outcomes)``. Robot k has
 slot k of the learner, where its attempts go on. All robots share one memory, its goal models and one record.
@@ -12,7 +12,7 @@ slot k of the learner, where its attempts go on. All robots share one memory, it
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple, NoReturn, Protocol
 
@@ -21,9 +21,10 @@ from numpy.typing import ArrayLike
 
 from sgimd_torch.learner.events import Change, Event, Kind
 from sgimd_torch.learner.slots import RobotSlot
+from sgimd_torch.memory import Memory
 from sgimd_torch.memory.exemplars import Exemplars
 from sgimd_torch.parts import Inverse, Problem, Social, Strategy
-from sgimd_torch.spaces import Array, Demonstration, Failure, Lesson, Move, Request, check_point, read_only
+from sgimd_torch.spaces import Array, Demonstration, Failure, Lesson, Move, Request, check_point, read_only, stream
 
 Correspondence = Callable[[Array, Array], Array]
 """Function from times ``(n_times,)`` and trajectory ``(n_times, n_joints)`` to theta_d ``(theta_dim,)``, eq. (6)."""
@@ -58,6 +59,20 @@ class Restart(NamedTuple):
     change: Change | None
 
 
+class Beginning(NamedTuple):
+    """How a learner began, so that it can begin again.
+
+    Attributes:
+        begin: function (seed, memory) that builds it.
+        memory: exemplars that it began with.
+        watch: function that makes its watcher; None: nobody watches.
+    """
+
+    begin: Callable[[int, Memory], Learner]
+    memory: Memory
+    watch: Callable[[], Watcher | None]
+
+
 class Learner:
     """Alternates between autonomous exploration and attempts after demonstrations.
 
@@ -68,7 +83,7 @@ class Learner:
         correspondence: function from times and trajectory to theta_d, eq. (6); needed with ``social``.
 
     Attributes:
-        memory: all exemplars.
+        memory: all exemplars; without those of forgotten movements, it is another memory.
         problem: problem to learn; after a change of the robot its memory holds only exemplars that still help.
         inverse: inverse model; another inverse model of this problem may replace it.
         watcher: object that notices changes of the robot; None: nobody does.
@@ -76,6 +91,8 @@ class Learner:
         listeners: functions that are called with each `Event`, after it has happened.
         begun, seed: number of exemplars at the start, and number from which all random streams come.
         movements: number of movements, rests and failed movements included.
+        rows: row in memory of the exemplar of each movement, by number; of a movement that left none, what it was.
+        beginning: function, memory and watcher of its beginning; None: unknown, so it cannot forget.
 
     Raises:
         ValueError: ``social`` without ``correspondence``.
@@ -98,7 +115,9 @@ class Learner:
         self.begun, self.seed, self.movements = len(self.memory), problem.seed, 0
         self.watcher: Watcher | None = None
         self.changes: list[Change] = []
-        self._life: list[tuple[int, int] | Event] = []  # events; for a movement, its row in memory and its robot
+        self.rows: dict[int, int | Kind] = {}
+        self.beginning: Beginning | None = None
+        self._life: list[tuple[int, int] | Event] = []  # events; for a movement, its number and its robot
         self._slots = [RobotSlot(0)]
         self._new: list[RobotSlot] = []  # slots whose attempt no event has reported so far, in order of beginning
         self._asked: list[tuple[RobotSlot, Move | Failure | None]] = []  # what was asked for and is not told so far
@@ -125,14 +144,7 @@ class Learner:
 
     def events(self) -> Iterator[Event]:
         """All events so far, in order; movements lack goal and origin."""
-        memory = self.memory
-        for entry in self._life:
-            if isinstance(entry, Event):
-                yield entry
-            else:
-                row, robot = entry
-                context, theta, outcome = memory.contexts[row], memory.thetas[row], memory.outcomes[row]
-                yield Event(Kind.MOVED, context, theta, outcome=outcome, robot=robot)
+        yield from map(self._event, self._life)
         yield from self._beginnings([slot for slot, move in self._asked if not isinstance(move, Failure)])
 
     def __reduce__(self) -> NoReturn:
@@ -246,7 +258,7 @@ class Learner:
         self._asked = []
         for (slot, move), outcome in zip(asked, told, strict=True):
             self._tell(slot, move if isinstance(move, Move) else None, outcome)
-        self._restart_if_changed()
+        self._publish(*self._restarted())
 
     def replace_theta(self, theta: Array, *, robot: int = 0) -> None:
         """Replace the movement that is asked for of a ``robot`` by the recorded ``theta``, which equals it but for
@@ -306,7 +318,69 @@ class Learner:
         self._report_new()
         self._remember(context, theta, outcome)
         self._publish(Event(Kind.ADDED, context, theta, outcome=outcome))
-        self._restart_if_changed()
+        self._publish(*self._restarted())
+
+    def forget(self, movements: Iterable[int]) -> None:
+        """Take back movements whose outcomes were wrong: from now on it is as if their exemplars had never come.
+
+        The learner begins again with all other exemplars, as after a change of its robot: attempts under way end, and
+        all parts are built anew, the goal model with its regions, too. Changes of the robot are looked for again, so
+        one that only wrong outcomes had shown is taken back. `events` keep the movements.
+
+        Args:
+            movements: numbers of the movements from 0, as in the column ``movement`` of a record and in messages.
+
+        Raises:
+            RuntimeError: the outcome of the last movement was not told.
+            ValueError: there is no such movement, it left no exemplar, or it was forgotten before; or this learner has
+                a forward model, or no `beginning`. Nothing is forgotten then.
+        """
+        from sgimd_torch.learner.forgetting import forgettable  # few learners forget
+        from sgimd_torch.texts import as_spans
+
+        numbers = forgettable(movements, self.rows, len(self._asked))
+        if self._asked:
+            raise RuntimeError("forget() needs the outcome of the last movement first; was tell() forgotten?")
+        if self.problem.trained:
+            raise ValueError("a forward model cannot forget what it was trained on; begin a new run")
+        if self.beginning is None:
+            raise ValueError("this learner cannot forget, as it cannot begin again: use algorithms.learner_of()")
+        self._report_new()
+        self._publish(Event(Kind.FORGOTTEN, reply=as_spans(numbers)), *self.take_back(numbers))
+
+    def take_back(self, numbers: Sequence[int], *, watched: bool = True) -> list[Event]:
+        """Begin again without the exemplars of these movements, and return the events of restarts on the way.
+
+        Args:
+            numbers: numbers of movements that have an exemplar.
+            watched: whether changes of the robot are looked for; if not, a record tells them.
+        """
+        assert self.beginning is not None
+        (begin, memory, watch), movements = self.beginning, self.movements
+        seed = int(stream(self.seed, "forget", movements).integers(2**63))
+        gone, numbers_of = {*numbers}, {row: number for number, row in self.rows.items() if isinstance(row, int)}
+        self._life = [
+            entry if isinstance(entry, Event) or entry[0] not in gone else self._event(entry) for entry in self._life
+        ]
+        self.rows |= dict.fromkeys(numbers, Kind.FORGOTTEN)
+        for slot in self._slots:
+            slot.end()
+        before, events = Exemplars.of(self.memory), list[Event]()
+        self.go_on_as(begin(seed, memory))
+        self.memory, self.changes = self.problem.memory, []
+        watcher = None if self.watcher is None else watch()
+        self.watcher = watcher if watched else None
+        for row in range(self.begun, len(before.thetas)):
+            number = numbers_of.get(row)  # None: it was added or shown
+            if number in gone:
+                continue
+            if number is not None:
+                self.rows[number], self.movements = len(self.memory), number + 1
+            self._remember(*(table[row] for table in before))
+            events += self._restarted()
+        self.watcher, self.movements = watcher, movements
+        self.go_on_as(begin(seed, self.problem.memory))  # some parts look at the memory when they are built
+        return events
 
     def translate(self, demonstration: Demonstration) -> Array:
         """theta_d, eq. (6): the policy that corresponds to a demonstration.
@@ -413,22 +487,25 @@ class Learner:
 
     def _tell(self, slot: RobotSlot, move: Move | None, outcome: Array | Failure | None) -> None:
         """Tell what came of the movement of one robot, after its check."""
+        number = self.movements
         self.movements += 1
         if isinstance(outcome, Failure):
+            self.rows[number] = Kind.FAILED
             lost = Event(Kind.FAILED, reply=outcome.reason, robot=slot.number)
             failed = lost if move is None else slot.moved(Kind.FAILED, move, reply=outcome.reason)
             slot.end()
             self._publish(failed)
         elif move is None or outcome is None:
+            self.rows[number] = Kind.RESTED
             slot.advance(None)
             self._publish(Event(Kind.RESTED, slot.context, robot=slot.number))
         else:
             assert slot.context is not None
             self._remember(slot.context, move.theta, outcome)
-            row = len(self.memory) - 1
+            self.rows[number] = len(self.memory) - 1
             moved = slot.moved(Kind.MOVED, move, self.memory.outcomes[-1])
             slot.advance(moved.outcome)
-            self._publish(moved, row=row)
+            self._publish(moved, number=number)
 
     def _remember(self, context: Array, theta: Array, outcome: Array) -> None:
         if self.watcher is not None:
@@ -436,27 +513,36 @@ class Learner:
         for memory in dict.fromkeys((self.memory, self.problem.memory)):
             memory.extend(context[None], theta[None], outcome[None])
 
-    def _restart_if_changed(self) -> None:
-        """Begin again if the robot has changed: attempts end, and all parts are built anew."""
+    def _restarted(self) -> Iterator[Event]:
+        """Begin again if the robot has changed: attempts end, and all parts are built anew. The events are returned."""
         restart = None if self.watcher is None else self.watcher.restart_if_changed()
         if restart is None:
             return
         for slot in self._slots:
             slot.end()
         self.go_on_as(restart.learner)
-        self._publish(Event(Kind.RESTARTED, since=restart.since, kept=restart.kept))
+        yield Event(Kind.RESTARTED, since=restart.since, kept=restart.kept)
         if restart.change is not None:
             self.changes.append(restart.change)
-            self._publish(Event(Kind.CHANGED, reply=str(restart.change)))
+            yield Event(Kind.CHANGED, reply=str(restart.change))
 
     def go_on_as(self, other: Learner) -> None:
         """Take the problem and all parts of a learner that has begun again."""
         self.problem, self.inverse, self.autonomous = other.problem, other.inverse, other.autonomous
         self.social = other.social
 
-    def _publish(self, *events: Event, row: int | None = None) -> None:
+    def _event(self, entry: tuple[int, int] | Event) -> Event:
+        """An event of this life; a movement lacks goal and origin."""
+        if isinstance(entry, Event):
+            return entry
+        row = self.rows[entry[0]]
+        assert isinstance(row, int)
+        context, theta, outcome = (table[row] for table in Exemplars.of(self.memory))
+        return Event(Kind.MOVED, context, theta, outcome=outcome, robot=entry[1])
+
+    def _publish(self, *events: Event, number: int | None = None) -> None:
         for event in events:
-            self._life.append(event if row is None else (row, event.robot))
+            self._life.append(event if number is None else (number, event.robot))
             for listener in self.listeners:
                 listener(event)
 

@@ -21,6 +21,7 @@ class Kind(StrEnum):
     ASKED = "asked"  # request; ``reply`` is its result, and after "shown" the next event is the demonstration
     ADDED = "added"  # exemplar of a movement that the learner has not proposed
     RESTARTED = "restarted"  # the learner began again with the exemplars ``kept``, then those from row ``since`` on
+    FORGOTTEN = "forgotten"  # the movements ``reply``, such as "12,40-45", were taken back
     CHANGED = "changed"  # a change of the robot was noticed, ``reply`` describes it; a replay notices it again
     FAILED = "failed"  # movement without an outcome, for the reason ``reply``; if theta is None, no context was seen
     INTERRUPTED = "interrupted"  # interruption by the caller, before an outcome was told; robot -1: between movements

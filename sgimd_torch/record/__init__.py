@@ -274,7 +274,8 @@ class Record(AbstractContextManager["Record"]):
             if isinstance(error, RunError):
                 translated = error if str(self.path) in str(error) else RunError(f"{self.path}: {error}")
             elif isinstance(error, sqlite3.OperationalError) and "locked" in str(error):
-                translated = RunError(f"{self.path} is in use by another process; wait for it, or choose another --out")
+                told = "is in use by another process; wait for it; a new run needs another --out"
+                translated = RunError(f"{self.path} {told}")
             elif writing:
                 translated = OSError(f"{self.path} cannot be written: {error}")
             else:

@@ -23,6 +23,7 @@ from sgimd_torch.learner.events import TEACHER, BeforeMovement, Event, Kind
 from sgimd_torch.parts import Teacher
 from sgimd_torch.record import Record, ReplayError, RunError
 from sgimd_torch.spaces import ROUNDING, Array, Box, Demonstration, Episode, Failure, Move, Request
+from sgimd_torch.texts import numbers_in
 
 _HINT: Final = "was it recorded by another version or processor, or with another seed or configuration?"
 _TRAINED_ELSEWHERE: Final = (
@@ -30,7 +31,7 @@ _TRAINED_ELSEWHERE: Final = (
     "remembers the recorded thetas"
 )
 # Events that are never grouped with others.
-_ALONE: Final = (Kind.SHOWN, Kind.ASKED, Kind.ADDED, Kind.RESTARTED, Kind.CHANGED)
+_ALONE: Final = (Kind.SHOWN, Kind.ASKED, Kind.ADDED, Kind.RESTARTED, Kind.CHANGED, Kind.FORGOTTEN)
 _ROUNDED: Final = (
     "movement {} was recorded with a theta that differs by rounding: another version or processor made the record. The "
     "learner remembers the recorded theta"
@@ -51,7 +52,9 @@ def save_life(learner: Learner, path: str | os.PathLike[str]) -> None:
         OSError: ``path`` is a directory, a pipe, a device or a run, or cannot be written.
     """
     counted = {Kind.MOVED, Kind.ADDED, *([Kind.SHOWN] if learner.social and learner.social.remembers else [])}
-    lived = learner.begun + sum(event.kind in counted for event in learner.events())
+    events = [*learner.events()]
+    lived = learner.begun + sum(event.kind in counted for event in events)
+    lived -= sum(len(numbers_in(event.reply or "")) for event in events if event.kind == Kind.FORGOTTEN)
     if len(learner.memory) != lived:
         raise ValueError(
             f"the memory has {len(learner.memory)} exemplars, but {lived} were lived; were some added without "
@@ -62,7 +65,7 @@ def save_life(learner: Learner, path: str | os.PathLike[str]) -> None:
             raise OSError(f"{path} is the record of a run, which no life replaces; choose another file")
     about = {"begun": learner.begun, "seed": learner.seed, "versions": {"sgimd_torch": __version__}}
     with replacing(path, record=True) as partial, Record.make(partial, learner.problem.dims, about) as record:
-        for event in learner.events():
+        for event in events:
             record.add(event)
         record.commit()
 
@@ -174,6 +177,8 @@ def replay(
                 assert event.theta is not None
                 assert event.outcome is not None
                 learner.add(event.context, event.theta, event.outcome)
+            case Kind.FORGOTTEN:
+                learner.forget(numbers_in(event.reply or ""))
             case Kind.RESTARTED | Kind.CHANGED:  # the learner has noticed it again
                 pass
             case Kind.INTERRUPTED if between:

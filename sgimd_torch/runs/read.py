@@ -32,6 +32,7 @@ from sgimd_torch.runs.directory import (
     with_found_earlier,
 )
 from sgimd_torch.spaces import Array, Box, Demonstration
+from sgimd_torch.texts import as_spans, numbers_in
 
 Columns = dict[str, np.ndarray]
 """Columns of a table by name, with an entry for each row."""
@@ -56,8 +57,9 @@ class Run:
         index: ``(n,)`` numbers of the movements, from 0.
         origin: ``(n,)`` origin of each movement, such as "local" or "imitate"; "" for a rest.
         demonstration: ``(n,)`` indices in ``demonstrations`` of what was shown just before each movement; -1: nothing.
-        failed: ``(n,)``, whether each movement failed.
-        contexts, thetas, goals, outcomes: ``(n, dim)`` vectors of each movement; NaN stands for none.
+        failed, forgotten: ``(n,)``, whether each movement failed, or was taken back.
+        contexts, thetas, goals, outcomes: ``(n, dim)`` vectors of each movement; NaN stands for none, and for the
+            outcome of a movement that was taken back.
         evaluations: columns of the table ``evaluations``, by inverse model.
         errors: columns of the errors at all goals in all evaluations.
         benchmark: ``(n_goals, outcome_dim)`` benchmark goals.
@@ -94,6 +96,7 @@ class Run:
     refreshes: Columns | None = None
     requests: Columns | None = None
     failed: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, np.bool_))
+    forgotten: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, np.bool_))
     tolerance: float = float("nan")
     folder: str = ""
     remarks: list[str] = field(default_factory=list)
@@ -165,6 +168,8 @@ def read_run(path: str | os.PathLike[str]) -> Run:
         arrays, requests = _lived(record)
         derived: dict[str, Any] = {table: _columns(record, table) for table in DERIVED}
         n = record.movements
+    numbers = np.flatnonzero(arrays["forgotten"]).tolist()
+    forgotten = [f"taken back: movement {as_spans(numbers)}"] if numbers else []
     evaluated = derived["evaluations"]["movements"]
     is_empty = not demonstrations and not np.isfinite(arrays["outcomes"]).any()  # an empty memory is not evaluated
     with record.translated_errors():
@@ -178,7 +183,7 @@ def read_run(path: str | os.PathLike[str]) -> Run:
             robot=about["robot"],
             words=about["words"],
             folder=about.get("folder", ""),
-            remarks=[text for found in about.get("remarks", {}).values() for text in found.values()],
+            remarks=[text for found in about.get("remarks", {}).values() for text in found.values()] + forgotten,
             robots=about.get("robots", 1),
             rooms=about.get("rooms", []),
             tolerance=about.get("tolerance", float("nan")),
@@ -204,7 +209,7 @@ def _lived(record: Record) -> tuple[dict[str, Any], Columns | None]:
     """Movements as arrays by attribute of `Run`, and requests as columns or None."""
     c, p, t = record.dims
     origins, demonstration, cells, requests = list[str](), array("q"), array("d"), list[dict[str, Any]]()
-    changes, failed = list[str](), list[bool]()
+    changes, failed, forgotten = list[str](), list[bool](), list[int]()
     lessons = dict[int, int]()  # lessons by number of the next movement of the robot that was shown them
     for _, kind, origin, *vectors, lesson, who, strategy, reply, robot, _ in record.rows("events"):
         if lesson is not None:
@@ -217,6 +222,8 @@ def _lived(record: Record) -> tuple[dict[str, Any], Columns | None]:
             requests.append(asked | {f"wanted_{k}": value for k, value in wanted})
         elif kind == Kind.CHANGED:
             changes.append(reply)
+        elif kind == Kind.FORGOTTEN:  # changes were looked for again
+            forgotten, changes = forgotten + numbers_in(reply), []
         elif kind in (Kind.MOVED, Kind.RESTED, Kind.FAILED):
             failed.append(kind == Kind.FAILED)
             demonstration.append(lessons.pop(len(origins), -1))
@@ -227,6 +234,8 @@ def _lived(record: Record) -> tuple[dict[str, Any], Columns | None]:
     arrays: dict[str, Any] = {"changes": changes, "failed": np.array(failed, np.bool_), "index": np.arange(n)}
     arrays |= {"origin": np.array(origins, np.str_), "demonstration": np.array(demonstration, np.int64)}
     arrays |= dict(zip(("contexts", "thetas", "goals", "outcomes"), vectors_of, strict=True))
+    arrays["forgotten"] = np.isin(arrays["index"], forgotten)
+    arrays["outcomes"][forgotten] = np.nan
     columns = {name: np.array([request[name] for request in requests]) for name in requests[0]} if requests else None
     return arrays, columns
 

@@ -18,6 +18,7 @@ from sgimd_torch.memory.exemplars import Exemplars
 from sgimd_torch.record import Record, Row
 from sgimd_torch.record.layout import movements_after
 from sgimd_torch.runs.hooks import Listening
+from sgimd_torch.texts import numbers_in
 
 
 class Recalled:
@@ -49,13 +50,16 @@ class Recalled:
         learner, cells, restart = self._learner, list[Row](), None
         robot = math.inf  # of the last movement, if the next one may be of the same group
         for number, row in enumerate(self._events[self._read :], self._read + 1):
-            kind, counts = row[1], movements_after(0, row[1])
+            kind, counts = Kind(row[1]), movements_after(0, row[1])
             together = (counts and row[-2] > robot) or kind in (Kind.RESTARTED, Kind.CHANGED)
             if learner.movements >= movements and not together:
                 break
             self._read, learner.movements = number, learner.movements + counts
             robot = row[-2] if counts else math.inf
             self.failed += kind == Kind.FAILED
+            if counts:
+                lived = len(learner.memory) + len(cells)
+                learner.rows[learner.movements - 1] = lived if kind == Kind.MOVED else kind
             if kind in (Kind.MOVED, Kind.ADDED):
                 context, theta, _, outcome = (row[part] for part in self._parts)
                 cells.append(context + theta + outcome)
@@ -64,10 +68,12 @@ class Recalled:
                 cells.append((*shown.context, *learner.translate(shown), *shown.outcome))
             elif kind == Kind.RESTARTED:
                 restart = number, row[-1], len(learner.memory) + len(cells)
+            elif kind == Kind.FORGOTTEN:
+                self._give(cells)
+                learner.take_back(numbers_in(row[-3]), watched=False)
+                cells, restart = [], None
+        self._give(cells)
         ends = np.cumsum(learner.problem.dims)
-        lived = Exemplars(*np.split(np.array(cells, dtype=np.float64).reshape(-1, ends[-1]), ends[:2], axis=1))
-        for memory in dict.fromkeys((learner.memory, learner.problem.memory)):
-            memory.extend(*lived)
         if restart is not None and learner.watcher is not None:
             event, since, n = restart
             kept = np.array([row[1:] for row in self._kept if row[0] == event]).reshape(-1, ends[-1])
@@ -79,3 +85,11 @@ class Recalled:
             if isinstance(part, Listening):
                 refreshes = [row for row in self._refreshes if row[0] <= learner.movements]
                 part.recall(self._directory, refreshes, learner.memory)
+
+    def _give(self, cells: list[Row]) -> None:
+        """Give the learner these exemplars, context, theta and outcome in a row."""
+        learner = self._learner
+        ends = np.cumsum(learner.problem.dims)
+        lived = Exemplars(*np.split(np.array(cells, dtype=np.float64).reshape(-1, ends[-1]), ends[:2], axis=1))
+        for memory in dict.fromkeys((learner.memory, learner.problem.memory)):
+            memory.extend(*lived)

@@ -243,7 +243,7 @@ class RunLoop(AbstractContextManager["RunLoop"]):
             raise Stopped(stopping.heard)
 
     def _hear(self, event: Event) -> None:
-        if event.kind == Kind.CHANGED and not self.replaying:
+        if event.kind == Kind.CHANGED and self.record.add in self.parts.learner.listeners:  # not in a replay
             say(str(event.reply))
 
     def curves(self) -> dict[str, float]:

@@ -6,6 +6,7 @@ movements and at the end. Then the run is opened in every way.
 
 import csv
 import io
+import shutil
 import sys
 from dataclasses import replace
 from types import SimpleNamespace
@@ -22,6 +23,7 @@ from sgimd_torch.extras.ask import command as ask
 from sgimd_torch.extras.benchmark import command as benchmark
 from sgimd_torch.extras.film import command as film
 from sgimd_torch.extras.film.traced import traced
+from sgimd_torch.extras.forget import command as forget
 from sgimd_torch.extras.report import command as report
 from sgimd_torch.extras.table import command as table
 from sgimd_torch.extras.teach.command import options_of
@@ -29,7 +31,7 @@ from sgimd_torch.extras.teach.taught import ALONE, TaughtRun
 from sgimd_torch.learner import Learner
 from sgimd_torch.options.config import Config
 from sgimd_torch.options.parse import parse
-from sgimd_torch.record.replay import save_life
+from sgimd_torch.record.replay import load_life, save_life
 from sgimd_torch.runs.build import build
 from sgimd_torch.runs.command import main
 from sgimd_torch.runs.load import load_learner
@@ -236,6 +238,23 @@ def test_ask_gives_the_movements_of_the_learner_that_lived(run, tmp_path):
     np.testing.assert_array_equal(thetas, run.answers)
 
 
+@pytest.mark.parametrize("run", some("contexts", "failures", "prior", "noticed change"), indirect=True)
+def test_of_a_run_that_forgot_the_loaded_learner_is_the_one_that_lives_it_again(run, tmp_path, capsys):
+    path = tmp_path / "seed-000"
+    shutil.copytree(run.path, path)
+    wrong = np.flatnonzero(np.isfinite(read_run(path).outcomes[:, 0]))[-9:-4]
+    code = command(forget.main, [str(path), "--trust", "--movements", ",".join(map(str, wrong))])
+    if run.parts.learner.problem.trained:
+        assert (code, "a forward model cannot forget" in capsys.readouterr().err) == (2, True)
+        return
+    again, loaded = build(run.parts.config), load_learner(path, trust=True)
+    load_life(again.learner, path / "run.sqlite", teacher=again.teacher)
+    answers = [answers_of(replace(run.parts, learner=learner)) for learner in (again.learner, loaded)]
+    np.testing.assert_array_equal(*answers)
+    assert not np.array_equal(answers[0], run.answers)
+    assert len(loaded.memory) == len(run.parts.learner.memory) - 5
+
+
 @pytest.mark.usefixtures("answered_from_memory")
 @pytest.mark.parametrize("run", some("taught", "prior", "noticed change", "forward model"), indirect=True)
 def test_a_film_shows_the_learner_that_lived_early_and_at_the_end(run, tmp_path, capsys):
@@ -297,6 +316,11 @@ def test_a_change_is_said_recorded_and_reported_once(files, tmp_path, capsys):
     assert said in (tmp_path / "report.html").read_text()
     assert command(main, [*words, "230", "--resume"]) == 0
     assert read_run(tmp_path / "practice/seed-000").changes == [change]
+    assert said not in capsys.readouterr().err
+    assert command(forget.main, [str(tmp_path / "practice/seed-000"), "--movements=20", "--trust"]) == 0
+    assert said in capsys.readouterr().err  # it was looked for again
+    assert command(main, [*words, "240", "--resume"]) == 0
+    assert len(read_run(tmp_path / "practice/seed-000").changes) == 1
     assert said not in capsys.readouterr().err
 
 

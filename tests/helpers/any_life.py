@@ -164,6 +164,13 @@ class Lives(RuleBasedStateMachine):
         self.both(lambda learner, _: learner.add(CONTEXTS[0], np.full(3, 0.2 * k), np.array([0.3, 0.1 * k])))
 
     @precondition(lambda self: not self.contexts)
+    @rule(k=NUMBERS)
+    def forget(self, k):
+        known = [number for number, row in self.whole.rows.items() if isinstance(row, int)]
+        if wrong := known[k::7]:
+            self.both(lambda learner, _: learner.forget(wrong))
+
+    @precondition(lambda self: not self.contexts)
     @rule(n=MOMENTS, at_once=st.integers(1, 3))
     def run(self, n, at_once):
         def live(learner, teacher):

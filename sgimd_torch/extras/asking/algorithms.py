@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any, Final
 
-from sgimd_torch.algorithms import MakeInverse
+from sgimd_torch.algorithms import MakeInverse, learner_of
 from sgimd_torch.algorithms.practice import PRACTICE
 from sgimd_torch.calls import with_keywords_of
 from sgimd_torch.competence import AttemptCompetence
@@ -71,17 +71,21 @@ def sgim_acts(
         memory: memory, or exemplars to start from.
         parts: options of `GoalBabbling`; the goal model must be a `StrategicGoals`.
     """
-    problem = Problem(environment, seed, memory, inverse=inverse)
-    problem.autonomous = babbling = GoalBabbling(problem, **parts)
-    asking = dict[str, Asking]()
-    for teacher, demonstrator in teachers.items():
-        name = f"imitate {teacher}"
-        mimic = Mimic(problem, repeats=repeats, epsilon=epsilon, draws_from=name)
-        asking[name] = Asking(teacher, mimic, cost, demonstrator.takes)
-        if emulates and babbling.budget > 1:
-            emulate = Emulate(problem, strategy=AUTONOMOUS)
-            asking[f"emulate {teacher}"] = Asking(teacher, emulate, cost, demonstrator.takes)
-    return Learner(problem, StrategicBabbling(babbling, asking), correspondence=correspondence)
+
+    def begin(seed: int, memory: Memory | MakeMemory) -> Learner:
+        problem = Problem(environment, seed, memory, inverse=inverse)
+        problem.autonomous = babbling = GoalBabbling(problem, **parts)
+        asking = dict[str, Asking]()
+        for teacher, demonstrator in teachers.items():
+            name = f"imitate {teacher}"
+            mimic = Mimic(problem, repeats=repeats, epsilon=epsilon, draws_from=name)
+            asking[name] = Asking(teacher, mimic, cost, demonstrator.takes)
+            if emulates and babbling.budget > 1:
+                emulate = Emulate(problem, strategy=AUTONOMOUS)
+                asking[f"emulate {teacher}"] = Asking(teacher, emulate, cost, demonstrator.takes)
+        return Learner(problem, StrategicBabbling(babbling, asking), correspondence=correspondence)
+
+    return learner_of(begin, seed, memory)
 
 
 sgim_im = partial(sgim_acts, emulates=False)

@@ -17,7 +17,7 @@ from sgimd_torch.memory import Memory
 from sgimd_torch.record import Dims, Record, Row, RunError
 from sgimd_torch.spaces import Box, check_vector
 from sgimd_torch.tasks import Task
-from sgimd_torch.texts import NUMBER
+from sgimd_torch.texts import NUMBER, numbers_in
 
 
 def past_of(task: Task, path: Path, record: Path | None = None) -> tuple[Memory, list[str], str]:
@@ -72,8 +72,9 @@ def _recorded(path: Path, robot: Environment, dims: Dims) -> Iterator[Row]:
                     f"{name} of {path} lie in {recorded.low} to {recorded.high}, here in {box.low} to {box.high}"
                 )
         goal, outcome = sum(dims[:2]), sum(dims)  # their first columns, after those of context and theta
-        for _, kind, _, *cells in record.rows("events"):
-            if kind in (Kind.MOVED, Kind.ADDED):
+        forgotten = {k for row in record.rows("events") if row[1] == Kind.FORGOTTEN for k in numbers_in(row[-3])}
+        for movement, kind, _, *cells in record.rows("events"):
+            if kind == Kind.ADDED or (kind == Kind.MOVED and movement not in forgotten):
                 yield *cells[:goal], *cells[outcome : outcome + dims[2]]
 
 

@@ -17,7 +17,6 @@ from sgimd_torch.extras.changes.eras import SURE, Era, better
 from sgimd_torch.inverses.gaussian_process import one_thread
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.learner import Learner
-from sgimd_torch.learner.events import Kind
 from sgimd_torch.memory import Memory
 from sgimd_torch.memory.exemplars import Exemplars
 from sgimd_torch.parts import Problem
@@ -33,15 +32,12 @@ def error_knowing_previous(learner: Learner) -> float | None:
 
     None: it is not sure that they are worth knowing. The learner's robots must not have moved at once.
     """
-    pairs = [
-        (before.theta, (event.context, event.theta, event.outcome))
-        for before, event in pairwise(learner.events())
-        if before.kind == event.kind == Kind.MOVED
-    ]
+    rows = [learner.rows[number] for number in range(learner.movements)]
+    pairs = [pair for pair in pairwise(rows) if all(isinstance(row, int) for row in pair)]
     if len(pairs) < _FEWEST:
         return None
-    thetas, movements = zip(*pairs, strict=True)
-    alone, before = Exemplars(*map(np.array, zip(*movements, strict=True))), np.array(thetas)
+    earlier, later = np.array(pairs).T
+    alone, before = Exemplars.of(learner.memory, later), learner.memory.thetas[earlier]
     knowing = alone._replace(contexts=np.hstack((before, alone.contexts)))
     errors, errors_knowing = (_left_out(learner.problem, exemplars) for exemplars in (alone, knowing))
     if better(errors, errors_knowing, learner.problem.outcome_noise) < SURE:

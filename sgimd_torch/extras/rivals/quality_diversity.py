@@ -14,7 +14,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from sgimd_torch.algorithms import MakeInverse
+from sgimd_torch.algorithms import MakeInverse, learner_of
 from sgimd_torch.calls import with_keywords_of
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.inverses.local_process import LocalProcess
@@ -73,24 +73,29 @@ def quality_diversity(
     """
     if environment.contexts.dim:
         raise ValueError(f"quality diversity knows one context only, got contexts of dim {environment.contexts.dim}")
-    problem = Problem(environment, seed, memory, inverse=inverse)
-    outcomes, rng = environment.outcomes, problem.stream(origin)
+    outcomes = environment.outcomes
     cells = max(2, round(_DEFAULT_CELLS ** (1 / outcomes.dim))) if cells is None else check_count("cells", cells, 1)
     if cells**outcomes.dim > _MAX_CELLS:
         raise ValueError(f"cells must be {_MAX_CELLS} in all at most, got {cells} in {outcomes.dim} dimensions")
-    archive = GridArchive(
-        solution_dim=environment.policies.dim,
-        dims=[cells] * outcomes.dim,
-        ranges=list(zip(outcomes.low, outcomes.high, strict=True)),
-        seed=_seed(rng),
-        **annealed,
-    )
-    scheduler = Scheduler(archive, emitters(archive, rng))
-    explorer = QualityDiversity(problem, scheduler, origin)
-    if correspondence is None:
-        return Learner(problem, explorer)
-    social = ImitateIntoArchive(problem, explorer, Mimic(problem, repeats=imitations, epsilon=epsilon))
-    return Learner(problem, explorer, social=social, correspondence=correspondence)
+
+    def begin(seed: int, memory: Memory | MakeMemory) -> Learner:
+        problem = Problem(environment, seed, memory, inverse=inverse)
+        rng = problem.stream(origin)
+        archive = GridArchive(
+            solution_dim=environment.policies.dim,
+            dims=[cells] * outcomes.dim,
+            ranges=list(zip(outcomes.low, outcomes.high, strict=True)),
+            seed=_seed(rng),
+            **annealed,
+        )
+        scheduler = Scheduler(archive, emitters(archive, rng))
+        explorer = QualityDiversity(problem, scheduler, origin)
+        if correspondence is None:
+            return Learner(problem, explorer)
+        social = ImitateIntoArchive(problem, explorer, Mimic(problem, repeats=imitations, epsilon=epsilon))
+        return Learner(problem, explorer, social=social, correspondence=correspondence)
+
+    return learner_of(begin, seed, memory)
 
 
 @with_keywords_of(quality_diversity)

@@ -34,9 +34,10 @@ from sgimd_torch.options.config import Config, dashed
 from sgimd_torch.options.parse import parse
 from sgimd_torch.runs.directory import build_again, record_of
 from sgimd_torch.runs.messages import say
-from sgimd_torch.runs.program import parser_of
+from sgimd_torch.runs.program import argument, parser_of
 from sgimd_torch.runs.read import finished, movements_on_disk
 from sgimd_torch.runs.signals import loading
+from sgimd_torch.texts import SPANS
 
 MOST_SEEDS: Final = 100_000
 NOT_VARIED: Final = {
@@ -203,13 +204,7 @@ def _count(text: str) -> int:
 
 
 def _seeds(text: str) -> list[int]:
-    seeds: dict[int, None] = {}
-    for part in text.split(","):
-        ends = re.fullmatch(r"(\d+)(?:-(\d+))?", part, re.ASCII)  # Python reads the digits of all scripts
-        numbers = range(int(ends[1]), int(ends[2] or ends[1]) + 1) if ends else ()
-        if not numbers:
-            raise argparse.ArgumentTypeError(f"must be like 5, 0-19 or 0,3,7-9, got {text!r}")
-        if len(numbers) > MOST_SEEDS:
-            raise argparse.ArgumentTypeError(f"are at most {MOST_SEEDS}, got {text}")
-        seeds |= dict.fromkeys(numbers)
-    return list(seeds)
+    spans: tuple[range, ...] = argument(SPANS, text)
+    if any(span.stop - span.start > MOST_SEEDS for span in spans):
+        raise argparse.ArgumentTypeError(f"are at most {MOST_SEEDS}, got {text}")
+    return list(dict.fromkeys(itertools.chain(*spans)))

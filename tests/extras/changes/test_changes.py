@@ -233,6 +233,39 @@ def test_a_change_is_noticed_with_any_inverse_model_that_says_how_sure_it_is():
     assert isinstance(learner.inverse, Sure)
 
 
+def test_a_change_that_only_wrong_outcomes_had_shown_is_taken_back_with_them():
+    robot = Changing(ARM, "reversed", 150)
+    learner = practice(robot, 4)
+    live(learner, robot, 200)
+    (change,) = learner.changes
+    learner.forget(range(150, 200))
+    assert learner.changes == []
+    assert len(learner.problem.memory) == len(learner.memory) == 150 > change.helpful
+    robot.at = 1000
+    live(learner, robot, 260)
+    assert learner.changes == []
+    assert error(learner, robot) < 0.05
+
+
+def test_a_change_stays_when_others_are_forgotten_and_a_life_that_repeats_it_is_equal(tmp_path):
+    robot = Changing(ARM, "reversed", 150)
+    learner, again = practice(robot, 4), practice(robot, 4)
+    live(learner, robot, 220)
+    learner.forget([20, 160])
+    (change,) = learner.changes
+    assert 148 <= change.since <= 155
+    assert change.noticed <= 190
+    since = learner.memory.thetas[learner.rows[change.since] :]
+    assert np.array_equal(learner.problem.memory.thetas[-len(since) :], since)
+    save_life(learner, tmp_path / "life.sqlite")
+    load_life(again, tmp_path / "life.sqlite")
+    assert (again.changes, repr(again.inverse(NO_CONTEXT, GOALS[0]))) == (
+        learner.changes,
+        repr(learner.inverse(NO_CONTEXT, GOALS[0])),
+    )
+    assert np.array_equal(*(live(each, robot, 240) for each in (learner, again)))
+
+
 def test_memory_and_prior_together_are_refused():
     memory = practice(ARM, 0).memory
     with pytest.raises(ValueError, match="give memory, exemplars of this robot, or prior"):

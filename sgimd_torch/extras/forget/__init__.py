@@ -1,0 +1,3 @@
+"""Movements of a run that were measured wrongly are taken back."""
+
+WORDS = "command  command  forget"
