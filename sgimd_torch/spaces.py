@@ -224,6 +224,10 @@ class Box:
         """The value with its unit: "0.12 m", or "0.12" if there is no unit."""
         return f"{value:{form}} {self.unit}".rstrip()
 
+    def allows(self, point: Array) -> bool:
+        """Whether a robot would execute the movement ``point`` ``(dim,)`` of this Pi, as far as is known before."""
+        return True
+
     def sample(self, rng: np.random.Generator) -> Array:
         """``(dim,)``, a uniform point."""
         return self.low + self.sides * rng.random(self.dim)  # several times faster than rng.uniform, with equal draws
