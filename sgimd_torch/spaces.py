@@ -267,6 +267,10 @@ class Box:
         straight = points[..., [not wraps for wraps in self.periodic]]
         return np.concatenate((straight, radii * np.cos(angles), radii * np.sin(angles)), axis=-1)
 
+    def allows(self, point: Array) -> bool:
+        """Whether a robot would execute the movement ``point`` ``(dim,)`` of this Pi, as far as is known before."""
+        return True
+
     def sample(self, rng: np.random.Generator) -> Array:
         """``(dim,)``, a uniform point."""
         return self.low + self.sides * rng.random(self.dim)  # several times faster than rng.uniform, with equal draws

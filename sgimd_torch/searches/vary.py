@@ -6,16 +6,20 @@ search = Vary(problem)(estimate, goal); theta = next(search); theta = search.sen
 from __future__ import annotations
 
 from collections.abc import Generator
+from typing import Final
 
 from sgimd_torch.parts import Problem, Search
 from sgimd_torch.spaces import Array, Estimate
+
+TRIES: Final = 10  # largest number of variations that are tried for one that Pi allows
+WIDER: Final = 1.5  # factor of the noise after each; the last one is as good as random
 
 
 class Vary(Search):
     """Answer of the inverse model plus a little Gaussian noise.
 
     All movements vary theta_g; their outcomes do not change the search. Movements are clipped to Pi; the search never
-    ends.
+    ends. Where Pi does not allow a movement, the noise grows until it allows one.
 
     The search is meant for an accurate inverse model and for one or two movements at each goal. The outcomes correct
     the inverse model, and show how the outcome changes with theta.
@@ -43,5 +47,9 @@ class Vary(Search):
     def varied(self, theta: Array) -> Array:
         """``theta`` plus noise, clipped to Pi."""
         policies = self.problem.policies
-        noise = self.sd * policies.sides * self.rng.standard_normal(policies.dim)  # a third of the time of rng.normal
-        return policies.clip(theta + noise)
+        for k in range(TRIES):
+            sides = self.sd * WIDER**k * policies.sides
+            varied = policies.clip(theta + sides * self.rng.standard_normal(policies.dim))  # faster than rng.normal
+            if policies.allows(varied):
+                break
+        return varied

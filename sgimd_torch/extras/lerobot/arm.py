@@ -24,17 +24,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sgimd_torch.calls import with_keywords_of
-from sgimd_torch.environments.protocol import (
-    NotExecutedError,
-    SimulationError,
-    check_movement,
-    check_robot,
-    reason_of,
-    tried,
-)
-from sgimd_torch.extras.lerobot.watch import FIRST, Watch
+from sgimd_torch.environments.protocol import NotExecutedError, SimulationError, check_movement, check_robot, tried
+from sgimd_torch.extras.lerobot.watch import FIRST, LOOK, Watch
 from sgimd_torch.extras.models.mujoco_robot import MujocoRobot
-from sgimd_torch.extras.models.untouched import Untouched, touched_by
+from sgimd_torch.extras.models.untouched import Untouched, touched_by, way_to_start
 from sgimd_torch.extras.recordings.led import led
 from sgimd_torch.extras.recordings.units import motor_unit, scales_of
 from sgimd_torch.options.catalogue import load_reference
@@ -46,6 +39,7 @@ PATIENCE: Final = 0.06  # s in which a call whose packet is lost is tried again
 PAUSE: Final = 0.01  # s between two tries
 COOLER: Final = 5.0  # degrees C below ``heat`` at which movements go on
 GENTLY: Final = 0.5  # share of ``speed`` on the way back to rest, and of first steps
+FREE: Final = 0.1  # m, distance at which nothing is in the way of a first step
 RESTED: Final = 0.5  # s after a first step when the joint is still
 KEPT: Final = 0.9  # least share of the commands of ``rate`` that are sent without a warning
 OF_MODEL: Final = ("joints", "low", "high", "rest", "durations", "n_knots", "servos", "keyframe", "posture")
@@ -126,12 +120,7 @@ class LeRobotArm:
         self._see = load_reference("seen_by", seen_by) if seen_by else None
         self.robot, self._buses = self._made()
         self._twin = twin = MujocoRobot(model, outcome=outcome, outcome_noise=outcome_noise, settle=settle, **of_model)
-        self.contexts, self.outcomes, self.rest, self.primitive = (
-            twin.contexts,
-            twin.outcomes,
-            twin.rest,
-            twin.primitive,
-        )
+        self.contexts, self.outcomes, self.rest = twin.contexts, twin.outcomes, twin.rest
         self.outcome_noise, self.joints, self.within_reach = outcome_noise, twin.joints, twin.within_reach
         self.correspondence, self.files, self.remarks = twin.correspondence, twin.files, twin.remarks
         self.found_options = {name: twin.found_options[name] for name in self.FOUND_OPTIONS}
@@ -140,11 +129,10 @@ class LeRobotArm:
             raise ValueError(f"the actuators of {model} do not take positions of joints, as the motors of an arm do")
         if not seen_by and not twin.carries_outcome:
             raise ValueError(f"the joints do not say where {outcome} is; seen_by names a function that sees it")
-        known, self._motors = self.robot.action_features, list[str]()
-        for name in motors or self.joints:
-            self._motors.append(f"{name}.pos" if f"{name}.pos" in known else name)
-            if self._motors[-1] not in known:
-                raise unknown_name_error("motor", name, known, "; motors names one for each joint, in their order")
+        known = self.robot.action_features
+        self._motors = [f"{name}.pos" if f"{name}.pos" in known else name for name in motors or self.joints]
+        if missing := [name for name in self._motors if name not in known]:
+            raise unknown_name_error("motor", missing[0], known, "; motors names one for each joint, in their order")
         if len(self._motors) != len(self.joints):
             raise ValueError(f"motors must name one for each of {', '.join(self.joints)}, got {', '.join(motors)}")
         reads = {motor: motor_unit(self._buses, motor.removesuffix(".pos")) for motor in self._motors}
@@ -152,6 +140,7 @@ class LeRobotArm:
         self.settle, self.rate, self.speed, self.step, self.heat = settle, rate, speed, step, heat
         self._clock, self._is_slow, self.patience, self._ranges = clock, False, patience, ranges
         self._touches = partial(touched_by, twin, speed, GENTLY * speed, clearance)
+        self._way = partial(way_to_start, twin, GENTLY * speed, clearance)
         self.policies = Untouched(twin.policies.low, twin.policies.high, touches=self._touches)
         self._watch = Watch(self.joints, ranges, tolerance, stall, speed, step)
         self._command: Array | None = None  # the last one (rad); None: not connected
@@ -175,10 +164,10 @@ class LeRobotArm:
             raise NotExecutedError(f"not executed: {touched} would touch, or nearly")
         with self._torque_off_after_an_error():
             if self._command is None:
-                self._connect()
+                lies = self._connect()
                 if np.isinf(self._watch.delays).any():
-                    self._try_joints()
-                self._follow(self._twin.start[None], GENTLY * self.speed, self.settle)
+                    self._try_joints(lies)
+                self._follow(self._way(lies), GENTLY * self.speed, self.settle)
             self._follow(self._twin.commanded(theta), self.speed, self.settle)
             outcome = tried("outcome", self.outcomes.dim, self._outcome)
             self._follow(self._twin.start[None], GENTLY * self.speed, self.settle)
@@ -215,7 +204,7 @@ class LeRobotArm:
         if errors or left:  # this driver may believe for good that it is connected
             self.robot, self._buses = self._made()
         if left and (errors or not self._buses):
-            warnings.warn(f"torque may be on, switch off the power: {reason_of(left)}", RuntimeWarning, stacklevel=2)
+            warnings.warn(f"torque may be on, switch off the power: {left!r}", RuntimeWarning, stacklevel=2)
 
     def _made(self) -> tuple[Any, list[Any]]:
         robot = self._make()
@@ -240,21 +229,23 @@ class LeRobotArm:
         if heard := self._stopping.heard:
             raise SimulationError(f"stopped by {signal.Signals(heard).name} in mid-movement; torque is off")
 
-    def _connect(self) -> None:
+    def _connect(self) -> Array:
+        """``(n_joints,)`` rad, where the arm lies."""
         atexit.register(self.release)
         if not self.robot.is_connected:
             self.robot.connect()
         observation, names = self._answer(self.robot.get_observation), self.robot.action_features
         self._held = {name: 0.0 if name.endswith(".vel") else observation[name] for name in names}
         self._command = self._ranges.clip(self._measured(observation))
+        return self._command
 
-    def _try_joints(self) -> None:
-        """Before the first movement, ask each joint for a small step there and back, and see that it follows."""
-        assert self._command is not None
-        back, middle = self._command, (self._ranges.low + self._ranges.high) / 2
+    def _try_joints(self, back: Array) -> None:
+        """Before the first movement, ask each joint for a small step there and ``back``, and see that it follows."""
+        middle = (self._ranges.low + self._ranges.high) / 2
+        self._follow(back[None], GENTLY * self.speed, RESTED)  # a joint that reads another frame moves now
         for k, step in enumerate(np.diag(np.minimum(FIRST, self._ranges.sides / 2) * np.where(back > middle, -1, 1))):
             steps = [joints for joints in (back + step, back - step) if self._ranges.contains(joints)]
-            there = min(steps, key=self._twin.posture_touches)
+            there = max(steps, key=partial(self._twin.gap, most=FREE))
             self._follow(there[None], GENTLY * self.speed, RESTED)
             self._watch.learn(k)
             self._follow(back[None], GENTLY * self.speed, RESTED)
@@ -266,6 +257,7 @@ class LeRobotArm:
         moving = np.flatnonzero((commands != commands[-1]).any(axis=1)).max(initial=-1)
         begun = then = due = away_at = clock.monotonic()
         self._watch.begin(begun, self._command)
+        pause = LOOK if np.isinf(self._watch.delays).any() else np.inf
         whole = np.abs(np.diff(commands, axis=0, prepend=self._command[None])).sum(axis=0).max()
         longest = len(commands) * timestep + whole / speed + settle + self.patience
         while True:
@@ -289,7 +281,10 @@ class LeRobotArm:
             if row <= moving or not np.allclose(self._command, commands[-1], atol=1e-6):
                 away_at = now
             due = max(due + 1 / self.rate, clock.monotonic())
-            clock.sleep(max(0.0, due - clock.monotonic()))  # time passes between two looks at a clock
+            while (left := due - clock.monotonic()) > 0:
+                clock.sleep(min(left, pause))
+                if left > pause:
+                    self._watch.see(clock.monotonic(), self._look())
             if now - away_at >= settle:
                 break
         self._watch.errors = np.maximum(self._watch.errors, np.abs(self._command - measured))

@@ -5,10 +5,11 @@ watch.check(measured); watch.see(now, measured); watch.command(now, wanted, push
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sgimd_torch.environments.protocol import SimulationError
 from sgimd_torch.spaces import Array, Box
@@ -17,7 +18,8 @@ BEGUN: Final = 0.2  # s after which all joints follow their commands
 HELD: Final = 0.05  # s in which a stalled joint has not moved
 MOVED: Final = 0.01  # rad, least way of a joint that moves
 FASTER: Final = 2.0  # times its allowed speed at which a joint may catch up with its command
-FIRST: Final = 0.12  # rad, length of a first step; then no joint may go farther than twice that and its tolerance
+LOOK: Final = 0.004  # s between two looks in first steps
+FIRST: Final = 0.12  # rad, length of a first step; in it no joint may leave its commands by more than its tolerance
 FOLLOWS: Final = (0.4, 1.6)  # least and largest way of a joint that follows, in ways of its command
 CROSSED: Final = 0.25  # share of a step; a command and its joint cross it one delay apart
 
@@ -48,16 +50,14 @@ class Watch:
 
     def check(self, measured: Array) -> Array:
         """The readings, none of which lies outside the range of its joint."""
-        for k in np.flatnonzero(np.abs(measured - measured.clip(self._low, self._high)) > self._tolerance).tolist():
-            raise SimulationError(
-                f"{self._told(k, measured)}; is its unit or its calibration another one? torque is off"
-            )
+        beyond = np.abs(measured - measured.clip(self._low, self._high)) > self._tolerance
+        self._fail(beyond, measured, lambda k: "; is its unit or its calibration another one?")
         return measured
 
     def begin(self, now: float, command: Array) -> None:
         """A movement begins."""
         still = np.zeros(len(command))
-        self._begun, self._sent, self._seen = now, [(now, command, still)], list[Array]()
+        self._begun, self._sent, self._seen = now, [(now, command, still)], list[tuple[float, Array]]()
         self._free_at, self._free, self._gone = still + now, still + np.inf, still.copy()
 
     def command(self, now: float, wanted: Array, push: Array) -> None:
@@ -73,16 +73,17 @@ class Watch:
         if self.last is not None:
             before, readings = self.last
             most = self._step + FASTER * self._speed * (now - before)
-            for k in np.flatnonzero(np.abs(measured - readings) > most).tolist():
-                told = f"{self._told(k, measured)}, {now - before:.2g} s after {readings[k]:.3g} rad"
-                raise SimulationError(f"{told}: no joint moves that far in the time; torque is off")
+            after = f", {now - before:.2g} s after {{:.3g}} rad: no joint moves that far in the time"
+            self._fail(np.abs(measured - readings) > most, measured, lambda k: after.format(readings[k]))
         self.last = now, measured
-        self._seen.append(measured)
-        first = self._seen[0] if np.isinf(self.delays).any() else measured
-        for k in np.flatnonzero(np.abs(measured - first) > 2 * FIRST + self._tolerance).tolist():
-            told = f"{self._told(k, measured)}, after {first[k]:.3g} rad and a first step of {FIRST:g} rad"
-            raise SimulationError(f"{told}: does it read what it is commanded in? torque is off")
+        self._seen.append((now, measured))
         times, commands, gone = (np.array(part) for part in zip(*self._sent, strict=True))
+        if np.isinf(self.delays).any():
+            first = self._seen[0][1]
+            way, asked = measured - first, commands - commands[0]
+            astray = np.maximum(asked.min(axis=0) - way, way - asked.max(axis=0))
+            steps = f" rad and a first step of {FIRST:g} rad: does it read what it is commanded in?"
+            self._fail(astray > self._tolerance, measured, lambda k: f", after {first[k]:.3g}{steps}")
         heard = np.maximum(np.searchsorted(times, now - self.delays, "right") - 1, 0)  # what each joint follows now
         if heard.min() > 0:  # the rest is not needed any more
             self._sent = self._sent[heard.min() :]
@@ -92,9 +93,8 @@ class Watch:
         free = (behind <= min(self._stall, self._step)) | (np.abs(measured - self._free) > MOVED)
         free |= now - self._begun < BEGUN + self.delays
         self._free_at[free], self._free[free], self._gone[free] = now, measured[free], gone[free]
-        for k in np.flatnonzero(
-            (gone - self._gone > self._stall) & (now - self._free_at > HELD + self.delays / 2)
-        ).tolist():
+        stalls = (gone - self._gone > self._stall) & (now - self._free_at > HELD + self.delays / 2)
+        for k in np.flatnonzero(stalls).tolist():
             told = f"{self._joints[k]} stalls at {measured[k]:.3g} rad on its way to {commands[-1, k]:.3g}"
             raise SimulationError(f"{told}; torque is off")
 
@@ -104,15 +104,19 @@ class Watch:
         Raises:
             SimulationError: it did not go the way of its command.
         """
-        seen, sent = np.array(self._seen), np.array([command for _, command, _ in self._sent])[:-1, k]
-        asked, ways = sent[-1] - sent[0], seen[-1] - seen[0]
+        looks, seen = map(np.array, zip(*self._seen, strict=True))
+        times, sent, _ = map(np.array, zip(*self._sent, strict=True))
+        asked, ways = sent[-1, k] - sent[0, k], seen[-1] - seen[0]
         if not FOLLOWS[0] <= ways[k] / asked <= FOLLOWS[1]:
             other = int(np.abs(ways).argmax())
-            told = f"{self._told(k, seen[-1])}: it was asked for a first step of {asked:.2g} rad and went {ways[k]:.2g}"
-            hint = f", and {self._joints[other]} moved" if other != k and abs(ways[other]) > FIRST / 2 else ""
-            raise SimulationError(f"{told}{hint}; torque is off")
-        late, due = (int(np.argmax((one - one[0]) / asked > CROSSED)) for one in (seen[:, k], sent))
-        self.delays[k] = self._sent[1 + late][0] - self._sent[1 + due][0]
+            told = f": it was asked for a first step of {asked:.2g} rad and went {ways[k]:.2g}"
+            told += f", and {self._joints[other]} moved" * bool(other != k and abs(ways[other]) > FIRST / 2)
+            self._fail(np.arange(len(ways)) == k, seen[-1], lambda k: told)
+        late, due = (np.argmax((one[:, k] - one[0, k]) / asked > CROSSED) for one in (seen, sent))
+        self.delays[k] = looks[late] - times[due]
 
-    def _told(self, k: int, measured: Array) -> str:
-        return f"{self._joints[k]} reads {measured[k]:.4g} rad, its range is {self._low[k]:.3g} to {self._high[k]:.3g}"
+    def _fail(self, wrong: NDArray[np.bool_], measured: Array, why: Callable[[int], str]) -> None:
+        """Raise an error for the first joint that reads something ``wrong`` ``(n_joints,)``."""
+        for k in np.flatnonzero(wrong).tolist():
+            told = f"{self._joints[k]} reads {measured[k]:.4g} rad, its range is {self._low[k]:.3g} to"
+            raise SimulationError(f"{told} {self._high[k]:.3g}{why(k)}; torque is off")

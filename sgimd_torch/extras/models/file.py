@@ -6,6 +6,7 @@ robot = load_model(Path("arm.xml"), (), "auto", "", ()); robot.model, robot.star
 from __future__ import annotations
 
 import math
+import re
 import warnings
 from collections.abc import Sequence
 from contextlib import suppress
@@ -27,6 +28,7 @@ from sgimd_torch.texts import unknown_name_error
 
 SERVOS: Final = ("auto", "file", "made")
 _FOLDERS: Final = ("assetdir", "meshdir", "texturedir")  # attributes of a compiler
+_DEFINITIONS: Final = ("xacro:property", "xacro:arg")
 _COPIED: Final = ("replicate", "composite", "flexcomp")  # elements that MuJoCo makes ``count`` times
 MOST_PARTS: Final = 100_000  # largest number of elements of a model, copies included
 HEIGHTS: Final = 1000  # number of heights of a field that count as one element
@@ -83,8 +85,9 @@ def _load(path: Path, joints: Sequence[str], servos: str, keyframe: str, posture
         raise unknown_name_error("servos", servos, SERVOS)
     if path.suffix.lower() == ".sdf":
         raise ValueError(f"{path.name} is an SDF file; MuJoCo reads MJCF and URDF, so give the robot's URDF")
+    included = list[Path]()
     with suppress(expat.ExpatError):  # MuJoCo says where
-        _check_parts(path)
+        included = _check_parts(path)
     remarks, slow, accelerations = list[str](), dict[str, float](), dict[str, float]()
     try:
         spec = mujoco.MjSpec.from_file(str(path))
@@ -136,21 +139,24 @@ def _load(path: Path, joints: Sequence[str], servos: str, keyframe: str, posture
         parts = sorted({file.resolve() for file in files if file.is_file()})
         return Loaded(model, data, kept, speeds, accelerations, remarks, parts)
     except (ValueError, expat.ExpatError) as error:
-        raise ValueError(f"{path.name} cannot be used: {_with_advice(' '.join(str(error).split()), path)}") from error
+        said = _with_advice(" ".join(str(error).split()), path, included)
+        raise ValueError(f"{path.name} cannot be used: {said}") from error
 
 
-def _check_parts(path: Path) -> None:
-    """Refuse what MuJoCo would wait for, a pipe or a device that the model refers to, a model that is too large for it,
-    and a template of ROS."""
-    roots, known = [_root(path)], {path}
+def _check_parts(path: Path) -> list[Path]:
+    """The files that a model includes. Refuse what MuJoCo would wait for, a pipe or a device that the model refers to,
+    a model that is too large for it, and a template of ROS."""
+    roots, known = [_root(path)], [path]
     elements = [*roots[0].iter()]
     for element in elements:  # grows
-        if element.tag.startswith("xacro:") or any("${" in text or "$(" in text for text in element.attrib.values()):
+        defines = element.tag in _DEFINITIONS  # do no harm unless something refers to them
+        refers = any("${" in text or "$(" in text for text in element.attrib.values())
+        if refers or (element.tag.startswith("xacro:") and not defines):
             raise ValueError(f"{path.name} is a template of xacro; give its result: xacro {path.name} > robot.urdf")
         included = path.parent / element.get("file", "")
         if element.tag == "include" and included not in known and included.exists() and not included.is_dir():
             check_regular(included)
-            known.add(included)
+            known.append(included)
             roots.append(_root(included))
             elements += roots[-1].iter()
     if sum(map(_n_parts, roots)) > MOST_PARTS:
@@ -162,6 +168,7 @@ def _check_parts(path: Path) -> None:
             for mesh in (folder / name for folder in folders for name in (file, Path(file).name)):
                 if mesh.exists():
                     check_regular(mesh)
+    return known[1:]
 
 
 def _n_parts(root: ElementTree.Element) -> float:
@@ -209,8 +216,13 @@ def _take_posture(
         data.qpos[:] = before
         return [f"keyframe {keyframe} puts {', '.join(outside)} outside the range"] * bool(outside)
     mujoco.mj_forward(model, data)
+    within, kept = np.array(data.qpos), set[tuple[int, int]]()
     if touched := bool(touching(model, data, bodies)):
-        data.qpos[:] = nearest_posture(model, np.array(data.qpos), arm, bodies)
+        for _ in range(2):  # pairs that nothing parts would drag the posture far away
+            data.qpos[:] = nearest_posture(model, within, arm, bodies, kept)
+            mujoco.mj_forward(model, data)
+            if not (kept := touching(model, data, bodies)):
+                break
     way = float(np.abs(data.qpos - before).max(initial=0))
     causes = [f"{', '.join(outside)} outside the range"] * bool(outside) + ["links that touch"] * touched
     said = (
@@ -255,15 +267,21 @@ def _of_package(path: Path, file: str) -> str:
     return str(mesh)
 
 
-def _with_advice(said: str, path: Path) -> str:
-    """A message of MuJoCo, with what to do."""
+def _with_advice(said: str, path: Path, included: Sequence[Path]) -> str:
+    """A message of MuJoCo, with what to do, and where it is: in included files MuJoCo counts no lines."""
     advice = {
         "balanceinertia": _write('balanceinertia="true"', path),
         "mjMINVAL": _write('boundmass="1e-4" boundinertia="1e-6"', path),
         "decoder": "; MuJoCo reads MJCF or URDF, and meshes as .stl, .obj or .msh: convert it, or leave it out",
+        "positive eigenvalues": "; correct its ixx, iyy and izz",
+        "must be positive in geom": '; leave out what has no size, such as <sphere radius="0"/>',
+        "parent or child missing": '; each parent and child needs a link, also the world: <link name="world"/>',
         "opening file": "; put it beside the model, or into its meshdir, or leave it out",
     }
-    return said + "".join(text for word, text in advice.items() if word in said)
+    named = [word.encode() for word in re.findall("'(.+?)'", said)]
+    where = [file.name for file in included if all(word in file.read_bytes() for word in named)]
+    found = f"; see the included file {' or '.join(where)}" * bool(where and said.endswith("line 0"))
+    return said + found + "".join(text for word, text in advice.items() if word in said)
 
 
 def _write(attributes: str, path: Path) -> str:

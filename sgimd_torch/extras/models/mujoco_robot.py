@@ -7,7 +7,7 @@ outside Python. The folder ``models`` reads the file and finds what is named in 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -42,7 +42,7 @@ from sgimd_torch.extras.models.places import (
     pulled,
     slides_on,
 )
-from sgimd_torch.extras.models.posture import first_touch, touching
+from sgimd_torch.extras.models.posture import first_touch, gap, touching
 from sgimd_torch.spaces import Array, Box, check_count, check_point, check_rng, read_only, stream
 
 EXPLORED: Final = 300  # number of random movements that find T
@@ -235,7 +235,7 @@ class MujocoRobot:
         start, outcomes, rng = displaced * self._read(self._home), list[Array](), stream(0, "postures")
         for _ in range(POSTURES):
             joints = rng.uniform(low, high)
-            if not self.posture_touches(joints):
+            if self.gap(joints) >= 0:
                 outcomes.append(self.outcome_at(joints) - start)
         return np.reshape(outcomes, (-1, self._dim))
 
@@ -248,19 +248,23 @@ class MujocoRobot:
         """``(n_steps, n_commands)``, commands of a movement without noise, one for each timestep of the model."""
         return self._commands(theta, stream(0, "no noise"))[:, self._actuators]
 
-    def touches(self, commands: Array, clearance: float) -> str:
-        """What touches first on the simulated way of ``commands`` ``(n_steps, n_commands)``; see `first_touch`."""
+    def touches(self, commands: Array, clearance: float, joints: Array | None = None) -> str:
+        """What touches first on the simulated way of ``commands`` ``(n_steps, n_commands)``; see `first_touch`.
+
+        The way begins at the start, or at ``joints`` (rad), where the robot lies.
+        """
         sent = np.tile(self._held, (len(commands), 1))
         sent[:, self._actuators] = commands
-        (states,) = self._simulate(np.zeros((1, self.contexts.dim)), [sent])
+        (states,) = self._simulate(np.zeros((1, self.contexts.dim)), [sent], joints)
         every = max(1, round(LOOKED_EVERY / self.model.opt.timestep))
-        return "" if states is None else first_touch(self.model, states[::every], self.bodies, clearance)
+        seen: Iterable[Array] = [] if states is None else states[::every]
+        return first_touch(self.model, seen, self.bodies, clearance, lying=joints is not None)
 
-    def posture_touches(self, joints: Array) -> bool:
-        """Whether the robot touches itself or anything when its joints are at ``(n_joints,)`` rad."""
+    def gap(self, joints: Array, most: float = 0.0) -> float:
+        """Least distance (m) of the robot to itself and to anything when its joints are at ``(n_joints,)`` rad; at most
+        ``most``, below 0 if it touches."""
         self.outcome_at(joints)
-        mujoco.mj_collision(self.model, data := self._data[0])
-        return bool(touching(self.model, data, self.bodies, alone=False))
+        return gap(self.model, self._data[0], self.bodies, most)
 
     def outcome_at(self, joints: Array) -> Array:
         """``(outcome_dim,)``, measured places when the robot's joints are at ``(n_joints,)`` rad; other things rest."""
@@ -396,9 +400,14 @@ class MujocoRobot:
             )
         return int(np.ceil(n))
 
-    def _simulate(self, contexts: Array, commands: Sequence[Array]) -> list[Array | None]:
-        """States of each movement, the first one before its first step; None if the simulation diverged."""
+    def _simulate(self, contexts: Array, commands: Sequence[Array], joints: Array | None = None) -> list[Array | None]:
+        """States of each movement, the first one before its first step; None if the simulation diverged.
+
+        The robot's joints begin at ``joints`` (rad or m), None: at the start.
+        """
         starts = np.stack([self.start_in(context) for context in contexts])
+        if joints is not None:
+            starts[:, 1 + self.model.jnt_qposadr[self._joint_ids]] = joints
         longest = max(map(len, commands))
         controls = np.stack([np.pad(one, ((0, longest - len(one)), (0, 0)), "edge") for one in commands])
         run, _ = self._pool.rollout(self.model, self._data, starts, controls)

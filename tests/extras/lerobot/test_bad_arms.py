@@ -81,6 +81,30 @@ def test_a_soft_and_late_arm_does_not_stall_where_nothing_is_in_its_way(tmp_path
     assert on.torque
 
 
+@pytest.mark.parametrize("delay", [0.0, 0.1])
+@pytest.mark.parametrize("frame", ["90 degrees off", "-90 degrees off", "20 degrees off", "wrong sign"])
+def test_a_joint_that_reads_another_frame_is_stopped_within_eleven_degrees(tmp_path, frame, delay):
+    for begin in (0, 50, -70):
+        arm, on = on_table(write(tmp_path / "arm.xml"), of_arm={"delay": delay, "noise": 0.2, "frame": FRAMES[frame]})
+        on.data.qpos[:3] = np.radians(begin)
+        with pytest.raises(SimulationError, match=r"^joint1 reads"):
+            arm.execute(NONE, MOVEMENTS[0], RNG)
+        assert np.abs(on.degrees() - begin).max() < 11
+
+
+def test_an_arm_goes_to_rest_by_a_way_that_touches_nothing_or_not_at_all(tmp_path):
+    model = upright(write(tmp_path / "arm.xml"))
+    arm, on = on_table(model, outcome="site:tip:xz")
+    on.data.qpos[:3] = np.radians([-15, 23, 96])  # its last link would sweep over the table if all joints moved at once
+    arm.execute(NONE, arm.policies.sample(RNG), RNG)
+    assert on.touches == 0
+    arm, on = on_table(model, outcome="site:tip:xz")
+    on.data.qpos[:3] = np.radians([85, 62, -97])  # below the table
+    with pytest.raises(SimulationError, match=r"on the way to rest .* and table would touch; lead the arm"):
+        arm.execute(NONE, arm.policies.sample(RNG), RNG)
+    assert not on.torque
+
+
 def test_a_movement_that_would_touch_the_table_is_not_executed_and_few_are_tried(tmp_path):
     built = upright(write(tmp_path / "built.xml", offsets=(2, -2, 2)))
     arm, on = on_table(upright(write(tmp_path / "arm.xml")), built, outcome="site:tip:xz", of_arm={"delay": 0.05})

@@ -56,7 +56,7 @@ def test_the_arm_keeps_rate_speed_and_step_and_goes_back_to_rest(model):
     arm.execute(NONE, FAR, RNG)
     times, commands, measured = motion(on)
     assert np.diff(times) == pytest.approx(1 / 40, abs=1e-5)
-    assert np.abs(np.diff(commands, axis=0)).max() == pytest.approx(1.5 / 40)
+    assert np.abs(np.diff(commands, axis=0)).max() == pytest.approx(1.5 / 40, rel=1e-5)
     assert np.abs(commands - measured).max() == pytest.approx(0.1)
     assert on.data.qpos[:3] == pytest.approx(0, abs=0.01)
     assert on.torque

@@ -33,6 +33,7 @@ PULLED = """<mujoco><worldbody>
   <actuator><position joint="grip" kp="5"/></actuator></mujoco>"""
 CART = """<mujoco><worldbody><body name="cart"><joint name="x" type="slide" axis="1 0 0"/><geom size=".1"/></body>
   </worldbody><actuator><motor joint="x" ctrlrange="-1 1"/></actuator></mujoco>"""
+BALL = '<link name="tool"><collision><geometry><sphere radius="0"/></geometry></collision></link>'
 LOST = (
     '<link name="x"><collision><geometry><mesh filename="package://lost/a.stl"/></geometry></collision></link>'
     '<joint name="y" type="fixed"><parent link="upper"/><child link="x"/></joint></robot>'
@@ -113,6 +114,20 @@ def test_an_attribute_whose_prefix_has_no_namespace_is_read_as_mujoco_reads_it(h
     assert robot.joints == ("shoulder", "elbow")
 
 
+def test_a_definition_of_xacro_that_nothing_refers_to_does_no_harm(here):
+    (here / "arm.urdf").write_text(URDF.replace("<link", '<xacro:property name="width" value=".2"/><link', 1))
+    assert MujocoRobot("arm.urdf", outcome="body:tool:xz", low=(-1, -1), high=(1, 1)).joints == ("shoulder", "elbow")
+
+
+def test_an_error_of_an_included_file_is_told_with_the_file(here):
+    (here / "options.xml").write_text('<mujoco><option apirate="200"/></mujoco>')
+    (here / "assets.xml").write_text('<mujoco><asset><texture name="sky" file="sky.png"/></asset></mujoco>')
+    included = '<mujoco><include file="options.xml"/><include file="assets.xml"/>'
+    (here / "arm.xml").write_text(ARM.replace("<mujoco>", included))
+    with pytest.raises(ValueError, match=r"unrecognized attribute: 'apirate'.*; see the included file options\.xml$"):
+        MujocoRobot("arm.xml", outcome="site:r:tip:x:xz")
+
+
 def test_what_slides_without_a_range_is_not_said_to_be_held_by_servos(here):
     (here / "cart.xml").write_text(CART.replace("<worldbody>", '<option gravity="1 0 0"/><worldbody>'))
     robot = MujocoRobot("cart.xml", outcome="body:cart:x", servos="file", low=(-1,), high=(1,))
@@ -181,8 +196,18 @@ def test_links_that_touch_are_moved_apart_by_the_shortest_way():
         f'<body pos="{x} 0 0"><joint type="slide" axis="1 0 0"/><geom size=".05"/></body>' for x in (0, 0.06)
     )
     model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{balls}</worldbody></mujoco>")
-    found = nearest_posture(model, np.zeros(2), [0, 1], [1, 2])
+    found = nearest_posture(model, np.zeros(2), [0, 1], [1, 2], set())
     assert found == pytest.approx([-0.02 - NEAR / 2, 0.02 + NEAR / 2], abs=1e-3)
+
+
+def test_links_that_touch_in_every_posture_do_not_move_the_start(here):
+    (here / "fat.xml").write_text("""<mujoco><worldbody><body name="base"><geom size=".05"/>
+        <body name="one" pos=".02 0 0"><joint name="a"/><geom size=".01"/>
+          <body name="two" pos=".02 0 0"><joint name="b"/><geom type="capsule" fromto="0 0 0 .2 0 0" size=".03"/>
+        </body></body></body></worldbody></mujoco>""")
+    robot = MujocoRobot("fat.xml", outcome="body:two:xy", low=(-1, -1), high=(1, 1))
+    assert robot.start == pytest.approx(0)
+    assert "contacts in the start posture are left out: base and two" in robot.remarks
 
 
 def test_an_arm_that_a_mocap_body_pulls_is_moved_by_its_joints_if_asked_for(here):
@@ -227,6 +252,9 @@ def test_a_slip_is_told_with_its_cause(here, options, said):
         (("</robot>", LOST.replace("package://lost/a.stl", "tool.stl")), "put it beside the model, or into"),
         (("0.3 0 0", "${length} 0 0"), "is a template of xacro; give its result: xacro arm.urdf > robot.urdf"),
         (('<link name="base"/>', '<xacro:base/><link name="base"/>'), "is a template of xacro"),
+        (('<link name="base"/>', ""), 'each parent and child needs a link, also the world: <link name="world"/>'),
+        (('iyy=".01" izz=".01"', 'iyy=".01" izz="-.01"'), "correct its ixx, iyy and izz"),
+        (('<link name="tool"/>', BALL), 'leave out what has no size, such as <sphere radius="0"/>'),
     ],
 )
 def test_what_mujoco_refuses_in_a_urdf_is_told_with_where_to_write_the_cure(here, change, said):
