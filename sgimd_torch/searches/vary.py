@@ -11,8 +11,8 @@ from typing import Final
 from sgimd_torch.parts import Problem, Search
 from sgimd_torch.spaces import Array, Estimate
 
-TRIES: Final = 10  # largest number of variations that are tried for one that Pi allows
-WIDER: Final = 1.5  # factor of the noise after each; the last one is as good as random
+TRIES: Final = 16  # largest number of variations that are tried for one that Pi allows
+WIDER: Final = 1.4  # factor of the noise after each; the last ones lie anywhere in Pi
 
 
 class Vary(Search):

@@ -191,6 +191,23 @@ def test_what_is_varied_spreads_by_sd_of_each_side(make, theta, mean, sd) -> Non
     assert varied.std(axis=0) / policies.sides == pytest.approx([sd, sd], rel=5 / np.sqrt(2 * n))
 
 
+class Right(Box):
+    """Movements of which the left half would hit something."""
+
+    def allows(self, point: Array) -> bool:
+        return bool(point[0] > 0.5)
+
+
+def test_variations_widen_until_pi_allows_one_and_stay_narrow_where_it_does() -> None:
+    policies = Right(np.zeros(2), np.ones(2))
+    search = Vary(problem(policies=policies))
+    for first, widest in ((0.2, 1.0), (0.8, 0.2)):
+        start = Estimate(np.array([first, 0.5]), np.zeros((1, 2)), np.zeros((1, 1)))
+        varied = np.array([next(search(start, np.zeros(1))) for _ in range(200)])
+        assert np.mean(varied[:, 0] > 0.5) > 0.98
+        assert np.abs(varied - start.theta).max() <= widest
+
+
 @pytest.mark.parametrize("corner", [0.0, 1.0])
 def test_a_simplex_begun_in_a_corner_steps_inwards_and_is_not_flat(corner: float) -> None:
     world = World(dim=5, k=0, centre=np.full(5, corner))

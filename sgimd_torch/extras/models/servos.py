@@ -65,6 +65,7 @@ def serve(
             bodies[model.body(k).name].gravcomp = 1
     for k in reversed([k for k, body in pulled(model) if {*joints_above(model, body)} & {*chosen}]):
         spec.delete(spec.equalities[k])
+    mujoco.mj_forward(model, data := mujoco.MjData(model))
     motors = dict[str, mujoco.MjsActuator]()
     for k, actuator in reversed([*enumerate(spec.actuators)]):
         if joint_of(model, k) in chosen:
@@ -73,6 +74,8 @@ def serve(
             motors[actuator.target], joint = actuator, spec.joint(actuator.target)
             if (effort := _effort(model, k)) and not model.jnt_actfrclimited[joint_of(model, k)]:
                 joint.actfrcrange, joint.actfrclimited = [-effort, effort], 1
+        elif joint_of(model, k) is None and {*_pulled_by(data, k)} <= {*model.jnt_dofadr[[*chosen]].tolist()}:
+            spec.delete(actuator)  # a tendon or muscle of joints that have servos
     for name in names:
         spec.joint(name).actgravcomp = 1
     for key in spec.keys:  # its commands are those of motors
@@ -95,6 +98,12 @@ def serve(
         servo.dyntype, servo.actlimited = mujoco.mjtDyn.mjDYN_NONE, 0
         servo.set_to_position(kp=stiffness, kv=max(0.0, 2 * np.sqrt(stiffness * inertia) - damping))
     return spec.compile(), speeds, accelerations
+
+
+def _pulled_by(data: mujoco.MjData, actuator: int) -> list[int]:
+    """Degrees of freedom that an actuator acts on in a state; [-1] if there are none."""
+    row = slice(data.moment_rowadr[actuator], data.moment_rowadr[actuator] + data.moment_rownnz[actuator])
+    return data.moment_colind[row][data.actuator_moment[row] != 0].tolist() or [-1]
 
 
 def _effort(model: mujoco.MjModel, actuator: int) -> float:

@@ -200,6 +200,14 @@ def test_links_that_touch_are_moved_apart_by_the_shortest_way():
     assert found == pytest.approx([-0.02 - NEAR / 2, 0.02 + NEAR / 2], abs=1e-3)
 
 
+def test_servos_that_are_made_take_the_place_of_tendons_too(here):
+    tendon = '<tendon><fixed name="t"><joint joint="r:1" coef="1"/></fixed></tendon>'
+    pulls = f'{tendon}<actuator><motor tendon="t" ctrlrange="-1 1"/>'
+    (here / "arm.xml").write_text(ARM.replace("<actuator>", pulls))
+    robot = MujocoRobot("arm.xml", outcome="site:r:tip:x:xz", servos="made", low=(-1, -1), high=(1, 1))
+    assert robot.joints == ("r:1", "r:2")
+
+
 def test_links_that_touch_in_every_posture_do_not_move_the_start(here):
     (here / "fat.xml").write_text("""<mujoco><worldbody><body name="base"><geom size=".05"/>
         <body name="one" pos=".02 0 0"><joint name="a"/><geom size=".01"/>
