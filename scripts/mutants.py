@@ -29,7 +29,7 @@ LONGEST: Final = 900  # time (s) after which the tests of a mutant are ended; an
 # Two lines for each mutant: name | file below sgimd_torch/ | files below tests/; then: text ==> text in its place.
 MUTANTS: Final = r"""
 eq. (2): the ninth of the nearest outcomes counts | competence.py | test_competence.py
-    near_outcomes(context, goal, 1)[0] ==> near_outcomes(context, goal, 9)[-1]
+    near_outcomes(context, goal, 1)] ==> near_outcomes(context, goal, 9)[-1:]]
 competence of an attempt by its worst outcome | competence.py | test_competence.py
     float(np.max(performance( ==> float(np.min(performance(
 eq. (3): progress is twice as large | goals/regions.py | goals/test_regions.py

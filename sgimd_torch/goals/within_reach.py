@@ -19,8 +19,8 @@ from numpy.typing import ArrayLike
 
 from sgimd_torch.goals.uniform import UniformGoals
 from sgimd_torch.memory import Rows
+from sgimd_torch.memory.reached import Reached
 from sgimd_torch.parts import Problem
-from sgimd_torch.searches.doubt import Reached
 from sgimd_torch.spaces import Array, check_count
 
 _FEWEST: Final = 21  # least number of exemplars that determine a box; with fewer, goals are uniform in T
@@ -73,7 +73,7 @@ class WithinReach(UniformGoals):
             None  # (2, outcome_dim), box of global movements, if goals lie half of the time there
         )
         self._at_home = False  # whether the next goal lies there
-        self._reached = Reached.of(problem)
+        self._reached = problem.shared(Reached, Reached)
         self._wraps = np.array(problem.outcomes.periodic or [False] * problem.outcomes.dim)
         self._n_confirmed = 0  # number of confirmed outcomes when the box was computed
         self._step = _WIDEST  # width of the step outside the box, relative to the box's longest side

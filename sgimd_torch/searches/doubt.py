@@ -12,11 +12,12 @@ from typing import Final
 import numpy as np
 
 from sgimd_torch.memory.growing import Growing
+from sgimd_torch.memory.reached import Reached
 from sgimd_torch.parts import Problem
 from sgimd_torch.searches.vary import Vary
 from sgimd_torch.spaces import Array, Estimate
 
-_FIRST: Final = 40  # number of exemplars from which on movements are doubted
+_FIRST: Final = 40  # number of new exemplars from which on movements are doubted
 _AGAIN: Final = 0.005  # standard deviation of a repetition, relative to the sides of Pi
 _NOVEL: Final = 0.25  # least distance to all other outcomes, relative to how far off the outcome is
 _KNOWN: Final = 3.0  # a miss is known from so many standard deviations of the outcome on
@@ -24,24 +25,6 @@ _NEARBY: Final = 0.5  # distance of goals that count as near, relative to the mi
 _NEAR_CONTEXT: Final = 0.25  # distance of contexts that count as near, relative to the sides of C
 _MISSES: Final = 10  # number of known misses near a goal after which a learner is stuck there
 _PROGRESS: Final = 0.8  # factor of the miss, compared with the oldest of these, below which it makes progress
-
-
-class Reached:
-    """What global movements reached, shared by explorer and goal model: see `Problem.shared`.
-
-    Attributes:
-        rows: rows of the global movements in memory.
-        confirmed: outcomes ``(outcome_dim,)`` that came again, though similar movements do not explain them.
-    """
-
-    def __init__(self) -> None:
-        self.rows: list[int] = []
-        self.confirmed: list[Array] = []
-
-    @classmethod
-    def of(cls, problem: Problem) -> Reached:
-        """That of all parts of a learner."""
-        return problem.shared(cls, cls)
 
 
 class Doubt:
@@ -55,8 +38,8 @@ class Doubt:
     """
 
     def __init__(self, problem: Problem) -> None:
-        self.problem, self.reached = problem, Reached.of(problem)
-        self._vary = Vary(problem, sd=_AGAIN).varied
+        self.problem, self.reached = problem, problem.shared(Reached, Reached)
+        self._vary, self._begun = Vary(problem, sd=_AGAIN).varied, len(problem.memory)
         self._unseen: list[int] = []  # rows that are still to be looked at
         self._doubted: list[tuple[Array, Array, float]] = []  # theta and outcome, and how far off that is
         self._repeated: list[tuple[Array, Array, float]] = []  # the same, with theta of the repetition
@@ -83,7 +66,7 @@ class Doubt:
                 return
         self.reached.rows.append(len(memory) - 1)
         self._unseen.append(len(memory) - 1)
-        while len(memory) >= _FIRST and self._unseen and not self._doubted:
+        while len(memory) - self._begun >= _FIRST and self._unseen and not self._doubted:
             self._look(self._unseen.pop(0))
 
     def _look(self, row: int) -> None:

@@ -7,7 +7,7 @@ from sgimd_torch.goals.uniform import UniformGoals
 from sgimd_torch.goals.within_reach import WithinReach
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.inverses.nearest import NearestNeighbour
-from sgimd_torch.searches.doubt import Reached
+from sgimd_torch.memory.reached import Reached
 from sgimd_torch.spaces import Box
 from worlds import NO_CONTEXT, problem, remember
 
@@ -139,7 +139,7 @@ def test_of_more_candidates_the_goal_is_the_one_with_the_less_sure_answer():
 def test_in_a_t_far_too_wide_half_of_the_goals_lie_where_global_movements_landed(side, at_home):
     outcomes = np.concatenate((scattered(2, 40) / 4, scattered(2, 300)))  # of global movements, then of others
     goals = within_reach(remembering(outcomes), Box.cube(-side, side, 2))
-    Reached.of(goals.problem).rows.extend(range(40))
+    goals.problem.shared(Reached, Reached).rows.extend(range(40))
     near = [np.abs(goals.sample(NO_CONTEXT)).max() < 0.3 for _ in range(400)]
     assert np.mean(near) == pytest.approx(at_home, abs=0.1)
 
@@ -148,7 +148,7 @@ def test_the_box_contains_an_outcome_that_came_twice():
     space = Box.cube(-20, 20, 2)
     goals = within_reach(remembering(scattered(2)), space)
     assert np.abs(np.array([goals.sample(NO_CONTEXT) for _ in range(200)])).max() < 3
-    Reached.of(goals.problem).confirmed.append(np.array([8.0, 0.0]))
+    goals.problem.shared(Reached, Reached).confirmed.append(np.array([8.0, 0.0]))
     found = np.array([goals.sample(NO_CONTEXT) for _ in range(200)])
     assert found[:, 0].max() > 7
     assert found[:, 0].min() > -5

