@@ -24,7 +24,7 @@ from sgimd_torch.spaces import Array
 Rows = NDArray[np.int64]
 Single = NDArray[np.float32]
 
-_FLAT_UP_TO: Final = 10_000, 1000  # rows from which a graph is quicker: so many, and so many for each dimension
+_FLAT_UP_TO: Final = 10_000, 400  # rows from which a graph is quicker: so many, and so many for each dimension
 _BLOCK: Final = 1000  # rows that enter a graph together
 _SPARE: Final = 8  # number of rows beyond k that faiss proposes
 _LINKS: Final = 32  # number of links of a row in the graph

@@ -55,7 +55,7 @@ def missed(make, seam, seed, **hand):
     return np.array([told.mean_error, np.nan_to_num(told.expected).mean()])
 
 
-@pytest.mark.parametrize("make", [practice, sagg_riac, sagg_riac_letter])
+@pytest.mark.parametrize("make", [practice, sagg_riac, pytest.param(sagg_riac_letter, marks=pytest.mark.slow)])
 def test_the_seam_is_a_place_like_any_other(make):
     at_seam, elsewhere = (sum(missed(make, seam, seed) for seed in (0, 1)) for seam in (-np.pi, 0.0))
     assert (at_seam < 1.3 * elsewhere + 1e-9).all()  # of more seeds see docs/research.md

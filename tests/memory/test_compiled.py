@@ -92,6 +92,7 @@ compiled("sgimd_torch.nothing")
 """
 
 
+@pytest.mark.slow
 def test_a_damaged_cache_is_made_again_and_a_change_of_what_compiled_code_calls_takes_effect(package, tmp_path):
     mine = {"NUMBA_CACHE_DIR": str(tmp_path / "mine")}
     (package / "memory" / "ordered.py").write_text(CALLING)  # compiled in a moment

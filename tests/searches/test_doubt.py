@@ -5,10 +5,11 @@ import pytest
 
 from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.inverses.local_process import LocalProcess
+from sgimd_torch.memory import Memory
 from sgimd_torch.searches.doubt import Doubt, Stuck
 from sgimd_torch.session import run
 from sgimd_torch.spaces import Box, Estimate
-from worlds import NO_CONTEXT, Boxes, problem, remember
+from worlds import NO_CONTEXT, Boxes, problem
 
 LINE = Box.cube(-3, 3, 1)
 
@@ -16,9 +17,10 @@ LINE = Box.cube(-3, 3, 1)
 def doubting(outcome):
     """A doubt and its memory of 60 movements on a line, then a global movement with this ``outcome``, like 0 .5 .5."""
     thetas = np.random.default_rng(0).random((60, 3))
-    memory = remember(thetas, thetas @ np.ones((3, 1)) / 3)
+    memory = Memory(0, 3, 1)
     space = problem(policies=Box.cube(0, 1, 3), outcomes=LINE, noise=0.01, memory=memory, inverse=LocalProcess)
     theta, doubt = np.array([0.0, 0.5, 0.5]), Doubt(space)
+    memory.extend(np.zeros((60, 0)), thetas, thetas @ np.ones((3, 1)) / 3)
     memory.add(NO_CONTEXT, theta, [outcome])
     doubt.add(theta)
     return doubt, memory, theta

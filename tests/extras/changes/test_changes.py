@@ -114,7 +114,7 @@ def test_if_nothing_holds_any_more_nothing_is_kept():
 
 def test_what_was_learnt_first_comes_back_with_the_first_robot():
     robot = Changing(ARM, "undone", 200)
-    learner = practice(robot, 3)
+    learner = practice(robot, 5)
     live(learner, robot, 700 + 100)
     _, back = learner.changes
     assert 698 <= back.since <= 704
