@@ -52,6 +52,9 @@ class WithinReach(UniformGoals):
     goals in the box. All contexts share the box. If the inverse model reports movements without an effect, goals are
     uniform in T, because a few effects do not show what can be reached.
 
+    If T is far larger than the box, half of the goals lie where global movements landed, because the box grows with
+    the learner's own extreme movements, too. The box contains outcomes that came again, see `searches.doubt`.
+
     Args:
         problem: problem to learn. If its inverse model does not say how sure it is, the first candidate is the goal.
         candidates: number of uniform goals of which the one with the least sure answer is chosen; 1: goals are uniform.
@@ -69,9 +72,7 @@ class WithinReach(UniformGoals):
         if candidates > 1 and not inverse.says_how_sure:
             problem.remarks.append(f"goals are uniform within reach: {inverse.__name__} does not say how sure it is")
         self._box: Array | None = None  # (2, outcome_dim), the box; None while all outcomes are equal
-        self._home: Array | None = (
-            None  # (2, outcome_dim), box of global movements, if goals lie half of the time there
-        )
+        self._home: Array | None = None  # box of global movements, if half of the goals lie there
         self._at_home = False  # whether the next goal lies there
         self._reached = problem.shared(Reached, Reached)
         self._wraps = np.array(problem.outcomes.periodic or [False] * problem.outcomes.dim)

@@ -2,7 +2,7 @@
 
 Our addition. A map from Pi to T may have two hills, and most movements lie on one of them. A single movement that hits
 the other one looks like a gross error, and answers from the first hill miss goals of the other one by a known distance.
-    doubt = Doubt(problem); doubt.add(context, theta); theta = doubt.next(); instead = Stuck(problem)(estimate, goal)
+    doubt = Doubt(problem); doubt.add(theta); theta = doubt.next(); instead = Stuck(problem)(estimate, goal)
 """
 
 from __future__ import annotations

@@ -50,6 +50,9 @@ class Returning(Explore):
     that moved the object. Go-Explore (Ecoffet et al. 2021) returns to a state before it explores. Variations widen
     after one with an effect, else narrow: the success rule of evolution strategies (Rechenberg 1973).
 
+    A global movement that nothing explains is repeated, and a goal that is missed again and again gets a global one,
+    see `searches.doubt`.
+
     Args:
         problem: problem to learn. If its inverse model reports no ``effects``, every movement counts as effective.
         first: number of movements at the start that are global.
