@@ -57,10 +57,10 @@ def missed(make, seam, seed, **hand):
 
 @pytest.mark.parametrize("make", [practice, sagg_riac, pytest.param(sagg_riac_letter, marks=pytest.mark.slow)])
 def test_the_seam_is_a_place_like_any_other(make):
-    at_seam, elsewhere = (sum(missed(make, seam, seed) for seed in (0, 1)) for seam in (-np.pi, 0.0))
+    at_seam, elsewhere = (missed(make, seam, 0) for seam in (-np.pi, 0.0))
     assert (at_seam < 1.3 * elsewhere + 1e-9).all()  # of more seeds see docs/research.md
     if make is practice:
-        assert missed(make, -np.pi, 0, periodic=())[0] > 1.5 * at_seam[0] / 2
+        assert missed(make, -np.pi, 0, periodic=())[0] > 1.5 * at_seam[0]
 
 
 @pytest.mark.parametrize("make", [Memory, FlatMemory, ScanMemory])
