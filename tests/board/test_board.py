@@ -155,7 +155,7 @@ SIX = ("random", "sagg-riac", "sgim-d", "practice", "practice-taught", "sagg-ria
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1])
 def test_of_two_learners_the_one_that_errs_less_has_the_higher_curves(seed):
-    """At goals that the curves do not know, tile by tile, wherever errors differ by more than a fifth, and by more than chance."""
+    """At goals that the curves do not know, by tile: where errors differ by a fifth, and by more than chance."""
     errors, curves, movements = {}, {}, 300
     for algorithm in SIX:
         parts = build(Config(algorithm=algorithm, seed=seed, parts={"environment": "planar-arm-7"}))
