@@ -156,12 +156,10 @@ class GoalBabbling(Strategy):
     def _explore(self, context: Array, goal: Array) -> Attempt:
         """Movements without end, each by global exploration or by local optimisation."""
         while True:
-            if self.rng.random() < self._global_probability(context, goal):
+            is_global = self.rng.random() < self._global_probability(context, goal)
+            estimate = None if is_global else self.inverse(context, goal)
+            if estimate is None or self.explore.instead(estimate, goal):
                 # Deviation: the paper prints "theta in T", which must be Pi.
-                yield Move(self.explore(context), goal, "global")
-                continue
-            estimate = self.inverse(context, goal)
-            if self.explore.instead(estimate, goal):
                 yield Move(self.explore(context), goal, "global")
             else:
                 yield from self._optimise(estimate, goal)

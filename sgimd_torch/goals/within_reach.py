@@ -73,7 +73,6 @@ class WithinReach(UniformGoals):
             problem.remarks.append(f"goals are uniform within reach: {inverse.__name__} does not say how sure it is")
         self._box: Array | None = None  # (2, outcome_dim), the box; None while all outcomes are equal
         self._home: Array | None = None  # box of global movements, if half of the goals lie there
-        self._at_home = False  # whether the next goal lies there
         self._reached = problem.shared(Reached, Reached)
         self._wraps = np.array(problem.outcomes.periodic or [False] * problem.outcomes.dim)
         self._n_confirmed = 0  # number of confirmed outcomes when the box was computed
@@ -88,22 +87,22 @@ class WithinReach(UniformGoals):
         Raises:
             ValueError: ``context`` is not one point of C.
         """
-        self._at_home = self._home is not None and bool(self.rng.random() < _HOME)
-        goal, inverse = self._within_reach(context), self.problem.inverse
+        at_home = self._home is not None and bool(self.rng.random() < _HOME)
+        goal, inverse = self._within_reach(context, at_home), self.problem.inverse
         if self.candidates == 1 or not inverse.says_how_sure or inverse.effects() is not None or not self._n_updated:
             return goal
-        goals = np.stack([goal, *(self._within_reach(context) for _ in range(self.candidates - 1))])
+        goals = np.stack([goal, *(self._within_reach(context, at_home) for _ in range(self.candidates - 1))])
         return np.asarray(goals[inverse.uncertainty(np.asarray(context, dtype=np.float64), goals).argmax()])
 
-    def _within_reach(self, context: ArrayLike) -> Array:
-        """A goal ``(outcome_dim,)``, uniform in T, or in the box that is widened by the step."""
+    def _within_reach(self, context: ArrayLike, at_home: bool) -> Array:
+        """A goal ``(outcome_dim,)``: uniform in T, in the widened box, or in that of global movements (``at_home``)."""
         goal, space = super().sample(context), self.problem.outcomes
         n = len(self.problem.memory)
         if n >= max(_FEWEST, _GROWTH * self._n_updated) or len(self._reached.confirmed) > self._n_confirmed:
             self._update_box()
         if self._box is None or self._all_of_t or self.problem.inverse.effects() is not None:
             return goal
-        home = self._home if self._at_home else None
+        home = self._home if at_home else None
         low, high = self._around(self._box, self._step) if home is None else self._around(home, _HOME_STEP)
         moved: Array = low + (goal - space.low) / space.sides * (high - low)
         return moved
@@ -136,11 +135,12 @@ class WithinReach(UniformGoals):
         self._n_confirmed = len(self._reached.confirmed)
         box = self._box_of(np.arange(0, n, 1 + n // _SAMPLED), self._reached.confirmed)
         self._box = self._box if box is None else box
-        if self._box is not None:
-            share = self._share_of(self._around(self._box, _WIDEST), self.problem.outcomes.sides)
-            self._all_of_t = share >= _ALL_OF_T
-            self._home = self._box_of(np.array(self._reached.rows, np.intp)) if share < _LARGE_T else None
-        if self._home is not None and self._box is not None:
+        if self._box is None:
+            return
+        share = self._share_of(self._around(self._box, _WIDEST), self.problem.outcomes.sides)
+        self._all_of_t = share >= _ALL_OF_T
+        self._home = self._box_of(np.array(self._reached.rows, np.intp)) if share < _LARGE_T else None
+        if self._home is not None:
             low, high = self._around(self._box, self._step)
             if self._share_of(self._around(self._home, _HOME_STEP), high - low) >= _SMALL_HOME:
                 self._home = None

@@ -86,11 +86,11 @@ class LocalProcess(Inverse):
         near = near_goal(memory, context, goal, _NEAR)
         thetas = memory.thetas[near]
         if self._kernel is None:
-            return Estimate(thetas[0], thetas, memory.outcomes_around(goal)[near], context)
+            return Estimate(thetas[0], thetas, memory.outcomes_around(goal, near), context)
         known, kernels = self._known(goal), compiled("sgimd_torch.inverses.kernels")
         starts = near[:_STARTS]
         alike, process_of = self._alike(starts)
-        linear, _ = corrected(memory, alike[:, :ALIKE].copy(), goal)
+        linear, _ = corrected(memory, known.outcomes, alike[:, :ALIKE].copy(), goal)
         question = Question(*map(read_only, (context, goal, starts, alike, process_of, linear)))
         theta, expected, sd = kernels.answer(question, known, self._kernel)
         proof = self._predicted(context, theta, known.outcomes, _PROOF)
@@ -153,8 +153,11 @@ class LocalProcess(Inverse):
     def unexplained(self, context: Array, theta: Array, outcome: Array) -> float:
         """Distance of an outcome from the predicted one, if beyond three standard deviations of the noise, else 0."""
         prediction = self.predict_variance(context, theta)
-        off = 0.0 if prediction is None else self.problem.outcomes.distance(prediction[0], outcome)
-        return off if prediction is not None and off > _BEYOND * math.sqrt(len(outcome) * prediction[2]) else 0.0
+        if prediction is None:
+            return 0.0
+        expected, _, noise = prediction
+        off = float(self.problem.outcomes.distance(expected, outcome))
+        return off if off > _BEYOND * math.sqrt(len(outcome) * noise) else 0.0
 
     def fitted(self) -> FittedKernel | None:
         """What predictions are made from; None while there are too few exemplars, or all outcomes are equal."""

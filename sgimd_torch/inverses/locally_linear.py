@@ -46,12 +46,14 @@ class LocallyLinear(Inverse):
         """
         memory, goal = self._memory, np.ascontiguousarray(goal, dtype=np.float64)
         near = near_goal(memory, context, goal, NEAR)
-        theta, rows = corrected(memory, memory.neighbourhoods(near, ALIKE, self._radius), goal)
-        return Estimate(theta, memory.thetas[rows], memory.outcomes_around(goal)[rows], context)
+        outcomes = memory.outcomes_around(goal)
+        theta, rows = corrected(memory, outcomes, memory.neighbourhoods(near, ALIKE, self._radius), goal)
+        return Estimate(theta, memory.thetas[rows], outcomes[rows], context)
 
 
-def corrected(memory: Memory, alike: Rows, goal: Array) -> tuple[Array, Rows]:
-    """The corrected theta_g and the rows of K_best, from neighbourhoods ``(h, k)``, -1 where they are fewer."""
+def corrected(memory: Memory, outcomes: Array, alike: Rows, goal: Array) -> tuple[Array, Rows]:
+    """The corrected theta_g and the rows of K_best, from neighbourhoods ``(h, k)``, -1 where they are fewer, and all
+    ``outcomes``, unwrapped around the goal."""
     kernels, theta = compiled("sgimd_torch.inverses.linear_kernel"), np.empty(memory.theta_dim)
-    best = kernels.locally_linear(alike, memory.thetas, memory.outcomes_around(goal), goal, memory.theta_range, theta)
+    best = kernels.locally_linear(alike, memory.thetas, outcomes, goal, memory.theta_range, theta)
     return theta, alike[best][alike[best] >= 0]

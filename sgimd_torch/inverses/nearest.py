@@ -34,7 +34,7 @@ class NearestNeighbour(Inverse):
         memory = self.problem.memory
         rows = near_goal(memory, context, goal, self.k)
         thetas = memory.thetas[rows]
-        return Estimate(theta=thetas[0], thetas=thetas, outcomes=memory.outcomes_around(goal)[rows], context=context)
+        return Estimate(theta=thetas[0], thetas=thetas, outcomes=memory.outcomes_around(goal, rows), context=context)
 
 
 def near_goal(memory: Memory, context: Array, goal: Array, k: int) -> Rows:

@@ -94,9 +94,10 @@ class Memory:
         """Outcomes, see `Box.on_circles`; the ``outcomes`` themselves if none wraps."""
         return self._on_circles.rows
 
-    def outcomes_around(self, goal: Array) -> Array:
-        """``(n, outcome_dim)``, the outcomes, unwrapped around a ``goal`` ``(outcome_dim,)``."""
-        return read_only(self.space.unwrapped(self.outcomes, goal)) if self.space else self.outcomes
+    def outcomes_around(self, goal: Array, rows: Rows | slice = slice(None)) -> Array:
+        """``(n, outcome_dim)``, the outcomes of some ``rows``, unwrapped around a ``goal`` ``(outcome_dim,)``."""
+        outcomes = self.outcomes[rows]
+        return read_only(self.space.unwrapped(outcomes, goal)) if self.space else outcomes
 
     @property
     def theta_range(self) -> Array:
@@ -151,15 +152,15 @@ class Memory:
 
     def copy(self, space: Box | None = None) -> Self:
         """A memory with copies of the exemplars; in a ``space`` T whose outcomes wrap, neighbours are found across."""
-        memory = copy(self)
-        memory.space = self.space if space is None else space if space.periodic else None
-        memory._begin()
+        memory = self.empty(space)
         memory.extend(self.contexts, self.thetas, self.outcomes)
         return memory
 
-    def empty(self) -> Self:
-        """A memory of the same kind, without exemplars."""
+    def empty(self, space: Box | None = None) -> Self:
+        """A memory of the same kind, without exemplars; for ``space`` see :meth:`copy`."""
         memory = copy(self)
+        if space is not None:
+            memory.space = space if space.periodic else None
         memory._begin()
         return memory
 

@@ -61,8 +61,9 @@ class Doubt:
         for k, (repetition, first, off) in enumerate(self._repeated):
             if np.array_equal(repetition, theta):
                 del self._repeated[k]
-                if self.problem.outcomes.distance(memory.outcomes[-1], first) < off / 2:
-                    self.reached.confirmed.append((memory.outcomes_around(first)[-1] + first) / 2)
+                again = self.problem.outcomes.unwrapped(memory.outcomes[-1], first)
+                if np.linalg.norm(again - first) < off / 2:
+                    self.reached.confirmed.append((again + first) / 2)
                 return
         self.reached.rows.append(len(memory) - 1)
         self._unseen.append(len(memory) - 1)

@@ -170,7 +170,7 @@ class AskedTeacher(Teacher):
         if len(memory) == 0:  # a learner without exemplars counts as stalled
             return np.inf
         distances = [
-            np.linalg.norm(memory.outcomes_around(d.outcome)[memory.near_outcomes(d.context, d.outcome, 1)] - d.outcome)
+            np.linalg.norm(memory.outcomes_around(d.outcome, memory.near_outcomes(d.context, d.outcome, 1)) - d.outcome)
             for d in self.demonstrations
         ]
         return float(np.mean(distances))
