@@ -36,7 +36,7 @@ def passes(room: str, folder: Path) -> bool:
         shutil.rmtree(folder / "sgimd_torch/extras" / name)
     tests = [f"tests/{name}" for name in OF_THE_CORE] + [str(path) for path in (folder / "tests").glob("test_*.py")]
     words = ["-q", "-n", "auto", "-m", "not slow", "-p", "no:cacheprovider", "--dist", "worksteal", *tests]
-    environment = {**os.environ, "PYTHONPATH": str(folder), "OMP_NUM_THREADS": "1"}
+    environment = {**os.environ, "PYTHONPATH": str(folder), "OMP_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": ""}
     done = subprocess.run([sys.executable, "-m", "pytest", *words], cwd=folder, env=environment)
     return done.returncode == 0
 

@@ -59,6 +59,7 @@ def reference(undisturbed):
 def module(tmp_path, monkeypatch):
     """Writes a module of a user's own into the working directory, which is ``tmp_path``; forgotten afterwards."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # bytecode of a file written twice a second may be older
     names = []
 
     def write(name, text):

@@ -9,6 +9,7 @@ from scipy.stats import ttest_rel
 from tensorboardX import summary
 
 from boards import ANY_OUTCOMES, board_of, board_of_any, curves_of, hparams_of
+from marks import slow
 from runs import content_of
 from sgimd_torch.board.curves import Behaviour, Places, evaluation_curves, region_curves, tiles_of
 from sgimd_torch.board.legend import LEGEND
@@ -264,7 +265,7 @@ def test_without_evaluations_there_are_curves_of_the_learners_own_goals_and_of_f
 
 
 SOME = ["practice-taught", "sagg-riac", "random"]
-MORE = [pytest.param(algorithm, marks=pytest.mark.slow) for algorithm in ("practice", "sgim-d")]
+MORE = [slow("practice"), slow("sgim-d")]
 
 
 @pytest.mark.parametrize("algorithm", [*SOME, *MORE])

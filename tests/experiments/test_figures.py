@@ -8,6 +8,7 @@ from evidence import Evidence, NotRun
 from figures import FIGURES, main
 from made_lives import write_lives
 from made_up import MOVEMENTS, write_rows
+from marks import slow
 from page_tables import GAIN
 from sgimd_torch.extras.table.names import COLOURS, NAMES
 from sgimd_torch.runs.program import command
@@ -68,7 +69,9 @@ def test_each_step_of_the_gain_that_was_run_has_a_row_from_the_top(found):
     assert ax.get_ylim()[0] > ax.get_ylim()[1]
 
 
-@pytest.mark.parametrize(("missing", "left_out"), [("sagg-riac-large", {"paper"}), ("practice-taught", {"learning"})])
+@pytest.mark.parametrize(
+    ("missing", "left_out"), [("sagg-riac-large", {"paper"}), slow("practice-taught", {"learning"})]
+)
 def test_only_those_figures_are_left_out_that_need_a_variant(tmp_path, capsys, missing, left_out):
     folder = write_lives(write_rows(tmp_path, without=[missing]), robots=10, seeds=2)
     for name in left_out:

@@ -13,6 +13,7 @@ from lightning import Trainer
 from scipy.stats import norm
 from torch.utils.data import DataLoader, TensorDataset
 
+from marks import slow
 from sgimd_torch.forward_model.model import ForwardModel
 from sgimd_torch.forward_model.networks import Network, nll
 from sgimd_torch.forward_model.shared import model_of
@@ -289,7 +290,7 @@ LINKED = pytest.mark.skipif(" " in torch.__file__, reason="inductor links nothin
 
 
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of torch itself
-@pytest.mark.parametrize("backend", ["eager", pytest.param("inductor", marks=[pytest.mark.slow, LINKED])])
+@pytest.mark.parametrize("backend", ["eager", slow("inductor", more=[LINKED])])
 @pytest.mark.parametrize("network", [{}, {"network": Own}])
 def test_torch_compiles_it_as_one_graph(backend, network):
     model = ensemble(**network).eval()

@@ -14,6 +14,7 @@ import pytest
 import torch
 
 from boards import curves_of
+from marks import slow
 from models import ARM, problem_of
 from runs import ROOT, about_of, content_of, write_about
 from sgimd_torch.board.legend import LEGEND
@@ -110,7 +111,7 @@ def test_every_refresh_is_recorded(reference):
     [
         ("reference", MODEL, MODEL),
         ("unguided", ALONE, ALONE),
-        ("unguided", ALONE, (*ALONE[:-1], "120")),  # its evaluation at 60 needs the model of that moment
+        slow("unguided", ALONE, (*ALONE[:-1], "120")),  # its evaluation at 60 needs the model of that moment
     ],
 )
 def test_a_run_made_longer_equals_a_long_run_and_so_do_its_board_and_checkpoint(

@@ -10,12 +10,13 @@ from tensorboard.plugins.hparams.metadata import (
     parse_session_start_info_plugin_data,
 )
 
+from marks import slow
 from own import MODULE
 from sgimd_torch.runs.command import main
 from sgimd_torch.runs.program import command
 
 # Robots with outcomes of one, three and two dimensions; the names of the last one look like formulas.
-ANY_OUTCOMES = ["sliders:Slider", "sliders:Slider3", "sliders:Shifted", "formula:Slider2"]
+ANY_OUTCOMES = [slow("sliders:Slider"), "sliders:Slider3", slow("sliders:Shifted"), "formula:Slider2"]
 
 
 def board_of(directory):

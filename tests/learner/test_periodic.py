@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from marks import slow
 from sgimd_torch.algorithms.paper import sagg_riac, sagg_riac_letter
 from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.evaluation import evaluate
@@ -55,7 +56,7 @@ def missed(make, seam, seed, **hand):
     return np.array([told.mean_error, np.nan_to_num(told.expected).mean()])
 
 
-@pytest.mark.parametrize("make", [practice, sagg_riac, pytest.param(sagg_riac_letter, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("make", [practice, sagg_riac, slow(sagg_riac_letter)])
 def test_the_seam_is_a_place_like_any_other(make):
     at_seam, elsewhere = (missed(make, seam, 0) for seam in (-np.pi, 0.0))
     assert (at_seam < 1.3 * elsewhere + 1e-9).all()  # of more seeds see docs/research.md

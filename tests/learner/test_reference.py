@@ -2,6 +2,7 @@
 
 import pytest
 
+from marks import slow
 from reference import ALL, KEPT, check_errors, check_movements, lived
 
 ARM = {"environment": "planar-arm-7"}
@@ -17,7 +18,7 @@ VARIANTS = {
 }
 RUNS = [f"{name} {seed}" for name in VARIANTS for seed in (1000, 1001) if name not in ("random", "observation")]
 RUNS += ["random 1000", "observation 1000"]
-TORCH = [pytest.param(run, marks=pytest.mark.slow) if run.startswith("model") else run for run in RUNS]
+TORCH = [slow(run) if run.startswith("model") else run for run in RUNS]
 
 
 @pytest.mark.parametrize("run", TORCH)

@@ -65,6 +65,7 @@ def test_the_cache_is_where_the_user_says(package, tmp_path):
     assert list((tmp_path / "mine").rglob("*.nbc"))
 
 
+@pytest.mark.slow
 def test_where_nothing_can_be_written_it_compiles_for_this_process_alone(package, tmp_path):
     (tmp_path / "file").touch()
     nowhere = {"HOME": str(tmp_path / "file"), "XDG_CACHE_HOME": str(tmp_path / "file")}

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from marks import slow
 from runs import (
     MOVEMENTS,
     STOPS,
@@ -48,7 +49,7 @@ LEARNERS = {
 
 @pytest.mark.parametrize(
     ("name", "movements", "signum", "code"),
-    [("rod", 64, signal.SIGKILL, -9), ("rod", 40, signal.SIGINT, 130), ("contexts", 33, signal.SIGKILL, -9)],
+    [("rod", 64, signal.SIGKILL, -9), ("rod", 40, signal.SIGINT, 130), slow("contexts", 33, signal.SIGKILL, -9)],
 )
 def test_a_run_that_is_stopped_and_resumed_ends_as_if_it_never_was(
     tmp_path, go, benchmark, capsys, name, movements, signum, code
@@ -240,7 +241,7 @@ def test_another_configuration_a_shorter_one_and_what_is_no_run_are_refused(tmp_
     assert files_of(copy) == before
 
 
-@pytest.mark.parametrize("watched", ["false", pytest.param("true", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("watched", ["false", slow("true")])
 def test_a_full_disk_is_reported_and_the_run_can_go_on(tmp_path, go, benchmark, reference, watched):
     words = (*arguments(tmp_path, benchmark), "--board", watched)
     process = start(STOPS.format(-1), *words, limit="-f 64")  # KiB a file may have
@@ -263,6 +264,7 @@ def viewed(path):
     return viewer
 
 
+@pytest.mark.slow
 def test_beside_an_open_cursor_of_another_program_a_killed_run_keeps_every_commit(tmp_path, go, benchmark, reference):
     directory = tmp_path / "sgim-d" / "seed-003"
     process = stopped_at("20 or life.movements == 60", *arguments(tmp_path, benchmark))
@@ -282,7 +284,7 @@ def test_beside_an_open_cursor_of_another_program_a_killed_run_keeps_every_commi
     assert files_of(directory) == before
 
 
-@pytest.mark.parametrize("local", [True, False])
+@pytest.mark.parametrize("local", [False, slow(True)])
 def test_where_a_reader_stops_commits_a_line_says_since_when(tmp_path, copy, monkeypatch, local, go, capsys):
     """A reader that came before the log, or a file system of several machines."""
     monkeypatch.setattr(run_module, "COMMIT_EVERY", 0.0)

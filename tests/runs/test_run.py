@@ -9,6 +9,7 @@ import sys
 import numpy as np
 import pytest
 
+from marks import slow
 from runs import ROOT, content_of
 from sgimd_torch.__main__ import _call
 from sgimd_torch.demonstrations import load_demonstrations, save_demonstrations
@@ -81,7 +82,7 @@ def test_an_error_of_a_part_keeps_its_traceback_and_says_how_to_go_on(tmp_path, 
     assert "Traceback (most recent call last):" in errors
 
 
-@pytest.mark.parametrize(("redirection", "code"), [("| true", 0), (">/dev/full", 1), ("2>&-", 0), (">&-", 0)])
+@pytest.mark.parametrize(("redirection", "code"), [("| true", 0), (">/dev/full", 1), slow("2>&-", 0), slow(">&-", 0)])
 def test_a_run_finishes_whatever_happens_to_its_output(tmp_path, redirection, code):
     script = [sys.executable, "-m", "sgimd_torch", "run", "--environment", "planar-arm-7", "--out", str(tmp_path)]
     command = shlex.join([*script, "--algorithm", "random", "--movements", "5", "--repeats", "0", "--name", "Å"])

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from marks import slow
 from sgimd_torch import FishingRod, load_learner, practice, run
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.extras.ask.command import DISTANCES, main
@@ -94,10 +95,10 @@ class Arm(PlanarArm):
 """
 LOST = [
     ("raises", "KeyError"),
-    ("nan", "must be finite"),
-    pytest.param("three", "must have shape (..., 2)", marks=pytest.mark.slow),
-    pytest.param("exits", "SystemExit: 0", marks=pytest.mark.slow),
-    pytest.param("masked", "a masked array", marks=pytest.mark.slow),
+    slow("nan", "must be finite"),
+    slow("three", "must have shape (..., 2)"),
+    slow("exits", "SystemExit: 0"),
+    slow("masked", "a masked array"),
 ]
 
 

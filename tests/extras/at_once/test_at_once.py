@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from marks import slow
 from runs import LIVE, content_of, start
 from sgimd_torch import session
 from sgimd_torch.extras.at_once.processes import in_processes
@@ -88,7 +89,7 @@ RUN = ["--algorithm", "practice", "--at-once", "4", "--environment"]
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("robot", "at_once"),
-    [("planar-arm-7", 4), ("robots_at_once:Odd", 2), pytest.param("experiments.toys:toss", 2, marks=pytest.mark.slow)],
+    [("planar-arm-7", 4), ("robots_at_once:Odd", 2), slow("experiments.toys:toss", 2)],
 )
 def test_a_run_that_was_stopped_goes_on_to_the_rows_of_a_whole_one(
     go, own, tmp_path, robot, at_once, capfd, monkeypatch

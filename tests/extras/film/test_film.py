@@ -11,6 +11,7 @@ import pytest
 from imageio_ffmpeg import get_ffmpeg_exe
 from PIL import Image, ImageSequence
 
+from marks import slow
 from runs import ROOT
 from sgimd_torch import Sketch
 from sgimd_torch.environments.fishing_rod import HOLD, FishingRod
@@ -214,7 +215,7 @@ def test_a_frame_shows_the_arm_as_it_was_and_rings_on_the_water_about_base_and_g
     assert 0 < (np.abs(seen["past"] - seen["landed"]).max(axis=2) > 30).sum() < 200  # two small tiles
 
 
-@pytest.mark.parametrize("gl", ["disable", "bogus"])
+@pytest.mark.parametrize("gl", ["disable", slow("bogus")])
 def test_without_opengl_the_error_says_what_to_set(run_path, tmp_path, gl):
     done = filmed(run_path, gl, "--out", str(tmp_path / "film.mp4"))
     assert done.returncode == 2

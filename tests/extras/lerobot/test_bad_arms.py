@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from arms import interrupt, on_table, upright, write
+from marks import slow
 from sgimd_torch import SimulationError, random_exploration, run, stream
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.protocol import NotExecutedError
@@ -39,7 +40,7 @@ FRAMES = {  # what joint1, or all joints, read
 }
 
 
-@pytest.mark.parametrize("delay", [0.0, 0.05, 0.1])
+@pytest.mark.parametrize("delay", [0.05, slow(0.0), slow(0.1)])
 @pytest.mark.parametrize("frame", FRAMES)
 def test_no_command_leaves_the_range_and_no_movement_is_endless_in_another_frame(tmp_path, frame, delay):
     for begin in (0, 50):
@@ -66,7 +67,7 @@ SOFT = {  # servos and links as those of an SO-101, with their weight
 }
 
 
-@pytest.mark.parametrize("delay", [0.0, 0.05, 0.1])
+@pytest.mark.parametrize("delay", [0.1, slow(0.0), slow(0.05)])
 @pytest.mark.parametrize("kp", [17.8, 100])
 def test_a_soft_and_late_arm_does_not_stall_where_nothing_is_in_its_way(tmp_path, kp, delay):
     built = write(tmp_path / "built.xml", offsets=(3, -3, 2), kp=kp)
@@ -81,7 +82,7 @@ def test_a_soft_and_late_arm_does_not_stall_where_nothing_is_in_its_way(tmp_path
     assert on.torque
 
 
-@pytest.mark.parametrize("delay", [0.0, 0.1])
+@pytest.mark.parametrize("delay", [0.1, slow(0.0)])
 @pytest.mark.parametrize("frame", ["90 degrees off", "-90 degrees off", "20 degrees off", "wrong sign"])
 def test_a_joint_that_reads_another_frame_is_stopped_within_eleven_degrees(tmp_path, frame, delay):
     for begin in (0, 50, -70):

@@ -203,6 +203,7 @@ def test_a_movement_led_by_hand_becomes_a_lesson(model, tmp_path, monkeypatch, c
     )
 
 
+@pytest.mark.slow
 def test_a_run_that_begins_with_its_simulator_and_is_stopped_in_mid_movement_goes_on(tmp_path, monkeypatch):
     model = write(tmp_path / "model.xml")
     arm, on = on_table(model, write(tmp_path / "real.xml", (0.21, 0.19, 0.2), (2.0, -3.0, 1.0)))

@@ -5,6 +5,7 @@ import pytest
 from matplotlib import rc_context
 
 from boards import ANY_OUTCOMES, board_of, board_of_any, pictures_of
+from marks import slow
 from sgimd_torch.extras.pictures import pictures
 from sgimd_torch.spaces import Box, stream
 from worlds import interest_map
@@ -12,7 +13,7 @@ from worlds import interest_map
 
 @pytest.mark.parametrize(
     ("high", "context", "worst"),
-    [((1.0, 1.0), (), -1.0), ((4.0, 0.8), (), -1.0), ((4.0, 1.73), (0,), -0.6), ((0.7, 0.98), (), -1.0)],
+    [slow((1.0, 1.0), (), -1.0), ((4.0, 0.8), (), -1.0), ((4.0, 1.73), (0,), -0.6), slow((0.7, 0.98), (), -1.0)],
 )
 def test_pictures_tell_small_errors_apart_and_cut_off_no_label(high, context, worst):
     space = Box(np.array([-0.3, -0.42]), np.array(high), ("tip x", "tip y"), "m")

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from marks import slow
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.extras.rivals.quality_diversity import (
     cma_mae_alone,
@@ -39,7 +40,7 @@ def cells_reached(learner: Learner) -> int:
     return len(learner.autonomous.archive)
 
 
-@BOTH
+@pytest.mark.parametrize("make", [*ELITES, TEAMS[0], slow(TEAMS[1])])
 def test_the_same_seed_makes_the_same_movements_and_another_seed_others(make):
     numpy_state = str(np.random.get_state())  # noqa: NPY002 - nobody may touch it
     first, same, other = (live(make(ARM, seed), 150) for seed in (1, 1, 2))

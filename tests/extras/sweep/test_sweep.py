@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from boards import hparams_of
+from marks import slow
 from odd import ODD, SWEEP, as_alone, odd_place, said_by
 from runs import content_of, start
 from sgimd_torch.extras.sweep import parallel
@@ -184,9 +185,7 @@ def test_a_run_that_is_killed_is_named_and_goes_on_next_time(odd, begun, tmp_pat
     assert as_alone(odd, tmp_path)
 
 
-@pytest.mark.parametrize(
-    ("signum", "code"), [(signal.SIGINT, 130), pytest.param(signal.SIGTERM, 143, marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize(("signum", "code"), [(signal.SIGINT, 130), slow(signal.SIGTERM, 143)])
 def test_stopped_it_stops_its_runs_and_goes_on_as_if_nothing_had_happened(
     odd, begun, tmp_path, monkeypatch, signum, code
 ):
