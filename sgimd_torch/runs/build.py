@@ -16,7 +16,6 @@ from sgimd_torch.parts import Teacher
 from sgimd_torch.runs.plan import Plan
 from sgimd_torch.runs.run_parts import RunParts
 from sgimd_torch.spaces import stream
-from sgimd_torch.tasks import benchmark_of
 
 
 def build(config: Config, record: Path | None = None) -> RunParts:
@@ -33,7 +32,7 @@ def build(config: Config, record: Path | None = None) -> RunParts:
     plan = Plan(config, record)
     robot, seed, teacher, given = plan.task.environment, config.seed, None, dict[str, Any]()
     config = config.with_found(robot.found_options if isinstance(robot, FromFiles) else {})
-    benchmark, plan.notes, plan.data["benchmark_crc32"] = benchmark_of(plan.task, config.benchmark)
+    plan.notes += robot.remarks if isinstance(robot, FromFiles) else ()
     for hook in plan.hooks:
         given |= hook.given(plan)
     if config.teaching == "teacher":
@@ -51,7 +50,7 @@ def build(config: Config, record: Path | None = None) -> RunParts:
     if not isinstance(learner, Learner):
         raise ValueError(f"{algorithm} must return a Learner, got a {type(learner).__name__}")
     of_hooks = given.get("teachers", {}), given.get("prior")
-    parts = RunParts(config, plan.task, plan.hooks, learner, teacher, *of_hooks, benchmark, plan.data, plan.notes)
+    parts = RunParts(config, plan.task, plan.hooks, learner, teacher, *of_hooks, plan.data, plan.notes)
     assert parts.inverses  # made here, so that their remarks are among the notes
     for hook in plan.hooks:
         hook.built(parts)

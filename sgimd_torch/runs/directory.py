@@ -77,7 +77,7 @@ def open_run(parts: RunParts, *, resume: bool) -> tuple[Record, list[str]]:
             damaged or no record; another process is writing it.
         OSError: the file cannot be written.
     """
-    config, robot = parts.config, parts.environment
+    config, robot, goals = parts.config, parts.environment, parts.benchmark.goals
     spaces = {"contexts": robot.contexts, "policies": robot.policies, "outcomes": robot.outcomes}
     path, notes = config.directory / RUN_FILE, list[str]()
     about: dict[str, Any] = {
@@ -110,7 +110,7 @@ def open_run(parts: RunParts, *, resume: bool) -> tuple[Record, list[str]]:
         record = _reopened(path, about, dims, parts, notes)
     else:
         raise RunError(f"{path.parent} already holds a run; continue it with --resume, or choose another --out")
-    record.replace_rows("goals", ((k, *goal) for k, goal in enumerate(parts.benchmark.goals.tolist())))
+    record.replace_rows("goals", ((k, *goal) for k, goal in enumerate(goals.tolist())))
     return record, notes
 
 

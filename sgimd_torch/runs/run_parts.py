@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 
 from sgimd_torch.environments.protocol import Environment
 from sgimd_torch.evaluation import Benchmark
@@ -14,7 +14,7 @@ from sgimd_torch.options.catalogue import load_word
 from sgimd_torch.options.config import OWN, Config
 from sgimd_torch.parts import Demonstrator, Inverse, Teacher
 from sgimd_torch.runs.hooks import Hook
-from sgimd_torch.tasks import Task
+from sgimd_torch.tasks import Task, benchmark_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +29,6 @@ class RunParts:
         teacher: teacher who demonstrates without being asked; None: no teacher.
         teachers: teachers who are asked, by name.
         prior: movements of another robot with which the learner begins; None: there are none.
-        benchmark: goals of evaluations.
         data: checksums of the files that were read.
         notes: messages for the user.
     """
@@ -41,7 +40,6 @@ class RunParts:
     teacher: Teacher | None
     teachers: Mapping[str, Demonstrator]
     prior: Memory | None
-    benchmark: Benchmark
     data: dict[str, str | None]
     notes: list[str]
 
@@ -49,6 +47,18 @@ class RunParts:
     def environment(self) -> Environment:
         """Robot of the task."""
         return self.task.environment
+
+    @cached_property
+    def benchmark(self) -> Benchmark:
+        """Goals of evaluations; an answer needs none, and those of a model file take half a second.
+
+        Raises:
+            ValueError: the goals do not fit the environment, or the file is damaged.
+            OSError: there is no such file.
+        """
+        benchmark, notes, self.data["benchmark_crc32"] = benchmark_of(self.task, self.config.benchmark)
+        self.notes.extend(notes)
+        return benchmark
 
     @property
     def robots(self) -> int:

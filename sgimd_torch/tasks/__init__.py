@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from sgimd_torch.environments.protocol import Environment, FromFiles, check_instance
+from sgimd_torch.environments.protocol import Environment, check_instance
 from sgimd_torch.evaluation import Benchmark, load_benchmark
 from sgimd_torch.files import checksum
 from sgimd_torch.learner import Correspondence
@@ -42,7 +42,7 @@ class Task:
 
 
 def benchmark_of(task: Task, file: Path | None) -> tuple[Benchmark, list[str], str | None]:
-    """Goals of evaluation, messages about the robot and its goals, and the checksum of their file (None: no file).
+    """Goals of evaluation, messages about them, and the checksum of their file (None: no file).
 
     Args:
         task: task of the run.
@@ -52,8 +52,7 @@ def benchmark_of(task: Task, file: Path | None) -> tuple[Benchmark, list[str], s
         ValueError: the goals do not fit the environment, or the file is damaged.
         OSError: there is no such file.
     """
-    source, robot, crc32 = file or task.benchmark, task.environment, None
-    notes = [*robot.remarks] if isinstance(robot, FromFiles) else []
+    source, robot, crc32, notes = file or task.benchmark, task.environment, None, list[str]()
     if isinstance(source, Path):
         crc32 = checksum(source)
         benchmark = load_benchmark(source)

@@ -31,7 +31,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sgimd_torch.environments.protocol import Environment, beside_execute, execute_many
+from sgimd_torch.environments.protocol import Environment, FromFiles, beside_execute, execute_many
 from sgimd_torch.extras.check.promises import check_environment
 from sgimd_torch.extras.check.remarks import remarks_on
 from sgimd_torch.extras.film.traced import traced
@@ -102,8 +102,9 @@ def _check_picture(task: Task) -> None:
 
 
 def _goals(task: Task) -> list[str]:
-    goals, notes, _ = benchmark_of(task, None)
-    notes = [f"goals of evaluation: {len(goals.goals)}", *notes, *_remarks(task.environment)]
+    robot, (goals, notes, _) = task.environment, benchmark_of(task, None)
+    remarks = robot.remarks if isinstance(robot, FromFiles) else ()
+    notes = [f"goals of evaluation: {len(goals.goals)}", *remarks, *notes, *_remarks(robot)]
     return [f"  {line}" for line in notes]
 
 
