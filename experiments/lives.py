@@ -1,6 +1,6 @@
 """Lives that are no runs of `sgimd run`: jobs of a sweep, each of which leaves the rows of a table in a file.
 
-    failures = sweep([Life("robots.csv", (500, "practice", 260), 1000)], Machine(2), on_end=partial(collect, results))
+    failures = sweep([Life("robots.csv", (800, "practice", 280), 1000)], Machine(2), on_end=partial(collect, results))
 A life that was stopped begins again, as its movements are not recorded.
 """
 

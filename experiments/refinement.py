@@ -41,7 +41,7 @@ ROBOTS: Final[Mapping[str, Mapping[str, Any]]] = {  # options of a run, by names
 }
 MOVEMENTS: Final = 2000
 WARM: Final = 200  # movements of lives before those that count, so that everything is loaded and compiled
-SEEDS: Final = range(260, 265)
+SEEDS: Final = range(280, 285)
 TABLE: Final = "refinement.csv"
 
 
