@@ -40,7 +40,7 @@ with loading():  # Ctrl-C shows no traceback
     from sgimd_torch.runs.read import finished, read_run
     from sgimd_torch.texts import unknown_name_error
     from table import FILE, LEARNING, ROWS, TABLES, Row, answers_of, merge, own_answer, read_table, result_rows
-    from variants import EXPERIMENTS, MADE, SEEDS, SMALL_TABLES, Variant, make_subsets
+    from variants import EXPERIMENTS, SEEDS, SMALL_TABLES, Variant
 
 LIVES: Final = {"robots": random_robots, "changes": changing}
 NAMES: Final[dict[str, Collection[str]]] = {
@@ -178,7 +178,7 @@ def jobs_of(experiment: str, only: Sequence[str], seeds: Sequence[int] | None, o
         experiment: name of the experiment, as in ``NAMES``.
         only: names of the variants to run; empty for all variants of the experiment.
         seeds: seeds of each variant; None for the seeds of its page.
-        out: folder of the runs; ``out/demonstrations`` has the files of ``make_subsets``.
+        out: folder of the runs.
     """
     chosen = [name for name in NAMES[experiment] if not only or name in only]
     if experiment in LIVES:
@@ -188,8 +188,6 @@ def jobs_of(experiment: str, only: Sequence[str], seeds: Sequence[int] | None, o
         for variant in chosen:
             line = EXPERIMENTS[experiment][variant]
             run: Variant = {"seed": seed, "out": out, "name": variant, "floor_at": (), **line}
-            if run.get("demonstrations") in MADE:
-                run["demonstrations"] = out / "demonstrations" / run["demonstrations"]
             config = Config.from_settings(run)
             configs.append(replace(config, evaluated_by=answers_of(config)))
     return configs
@@ -224,7 +222,6 @@ def collect(config: Config | Life, results: Path) -> None:
 
 def _run(jobs: Sequence[Config | Life], options: argparse.Namespace, on_end: Any = None) -> list[str]:
     """Carry out jobs; returns error messages, one for each failed job."""
-    make_subsets(options.out / LEARNING / "demonstrations")
     return sweep(jobs, engine_of(options), on_end=on_end)
 
 

@@ -16,10 +16,8 @@ from typing import Final
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
-from scipy import optimize, stats
 
 from sgimd_torch.extras.table.statistics import (
-    LEAST_SEEDS,
     LEVEL,
     Interval,
     bootstrap_rng,
@@ -110,18 +108,9 @@ class Evidence:
         """Our error divided by theirs, after ``at`` movements."""
         return self.over(self.at(ours, at), self.at(theirs, at), level=level)
 
-    def growth(self, name: str, late: int, early: int, *, level: Level = LEVEL) -> Interval:
-        """The error after ``late`` movements divided by the error after ``early`` movements."""
-        return self.over(self.at(name, late), self.at(name, early), level=level)
-
     def over_floor(self, ours: str, theirs: str, *, level: Level = LEVEL) -> Interval:
         """Our error at the end divided by their noise floor."""
         return self.over(self.at(ours), self.at(theirs, column="floor"), level=level)
-
-    def improvement(self, ours: str, theirs: str, *, level: Level = LEVEL) -> Interval:
-        """The probability that a run of ours ends with a smaller error than a run of theirs."""
-        errors = self.at(ours).to_numpy(), self.at(theirs).to_numpy()
-        return improvement_interval(*errors, level=LEVEL if level is None else level)
 
     def variance_ratio(self, ours: str, theirs: str, *, level: Level = LEVEL) -> Interval:
         """The variance over seeds of our error at the end, divided by the variance of theirs."""
@@ -272,44 +261,3 @@ def _two_or_more(values: pd.Series, what: str) -> pd.Series:
     if len(values) < 2:
         raise NotRun(what)
     return values
-
-
-def improvement(ours: Array, theirs: Array) -> Array:
-    """Probability of improvement: share of the pairs (one of our errors, one of theirs) in which ours is smaller.
-
-    The errors are ``(..., n)`` and ``(..., m)``; a tie counts half. The share is the Mann-Whitney statistic divided by
-    n m; see Agarwal et al. (2021).
-    """
-    x, y = np.asarray(ours)[..., :, None], np.asarray(theirs)[..., None, :]
-    shares: Array = np.mean((x < y) + 0.5 * (x == y), axis=(-2, -1))
-    return shares
-
-
-def improvement_interval(ours: Array, theirs: Array, *, level: float = LEVEL) -> Interval:
-    """``improvement`` of ours ``(n,)`` over theirs ``(m,)``, with a score interval, which stays wide for few seeds.
-
-    Wilson's interval for this statistic has all probabilities that the data do not reject (Newcombe 2006, Statistics in
-    Medicine 25:559, method 5). If all our errors are smaller than all of theirs, the interval is [.80, 1] with 10 seeds
-    and [.90, 1] with 20; a bootstrap would give [1, 1] even with 2 seeds. If errors are normal, the interval has the
-    true value in 95 to 98 % of cases with 5, 10 or 20 seeds. With fewer than ``LEAST_SEEDS``, both ends are NaN.
-
-    Raises:
-        ValueError: a side has fewer than 2 seeds, or an error is not finite.
-    """
-    for sample in (ours, theirs):
-        if len(sample) < 2 or not np.isfinite(sample).all():
-            raise ValueError(f"an interval needs 2 or more seeds with finite errors, got {np.asarray(sample).tolist()}")
-    n, m, share = len(ours), len(theirs), float(improvement(ours, theirs))
-    if min(n, m) < LEAST_SEEDS:
-        return Interval(share)
-    z = float(stats.norm.isf((1 - level) / 2))
-
-    def excess(p: float) -> float:
-        """Squared distance from p to the statistic, minus z^2 times the variance under p; above 0, p is rejected."""
-        variance = p * (1 - p) * (1 + ((n + m) / 2 - 1) * ((1 - p) / (2 - p) + p / (1 + p))) / (n * m)
-        return (share - p) ** 2 - z * z * variance
-
-    inside = float(np.clip(share, 1e-9, 1 - 1e-9))
-    low = optimize.brentq(excess, 0.0, inside) if share > 0 else 0.0
-    high = optimize.brentq(excess, inside, 1.0) if share < 1 else 1.0
-    return Interval(share, low, high)

@@ -27,7 +27,7 @@ from sgimd_torch.spaces import Array
 COMPARED: Final = tuple(name for name in LEARNERS if name != RANDOM)
 HARMFUL: Final = 1.02  # times the error of random movements; a larger error counts as harm
 MEANS: Final = dict(
-    zip(COUNTS, (0.75, 0.65, 0.40, 0.36, 0.32), strict=True)
+    zip(COUNTS, (0.72, 0.52, 0.35, 0.30, 0.28), strict=True)
 )  # bars of errors over those of random ones
 
 
@@ -78,11 +78,11 @@ def any_robot(evidence: Evidence) -> list[Claim]:
     def less(theirs: str) -> list[Part]:
         return [at_most(1, over, evidence, "practice", theirs, at, name=f"at {at}") for at in COUNTS]
 
-    seldom = [at_most(0.05, clearly_harmed, evidence, at, margin=0.1, name=f"at {at}") for at in COUNTS]
+    seldom = [at_most(0.03, clearly_harmed, evidence, at, margin=0.1, name=f"at {at}") for at in COUNTS]
     means = [at_most(bar, over, evidence, "practice", RANDOM, at, name=f"at {at}") for at, bar in MEANS.items()]
     listed = ", ".join(f"{bar:.2f}" for bar in MEANS.values())
     return [
-        Claim("`practice` clearly harms on at most 0.05 of the robots at each count, interval up to 0.15", seldom),
+        Claim("`practice` clearly harms on at most 0.03 of the robots at each count, interval up to 0.13", seldom),
         Claim(f"... errs in the mean at most {listed} times as much as random movements", means),
         Claim("... less than SAGG-RIAC at each: ratio ≤ 1", less("sagg-riac")),
         Claim("... than the standard baseline", less(BASELINE)),
@@ -287,31 +287,26 @@ def changed(page: Page) -> str:
 def changes(evidence: Evidence) -> list[Claim]:
     """Claims about `practice` on robots that change, and about beginning with a simulator."""
 
-    def parts(bar: float, *names: str, times: tuple[int, ...] = AFTER, other: str = ANEW) -> list[Part]:
+    def parts(bar: float, *names: str, other: str = ANEW) -> list[Part]:
         return [
             at_most(bar, over_anew, evidence, robot, change, at, GOES_ON, other, name=f"{change}, {robot}, {at}")
             for robot, change in product(ROBOTS, names)
-            for at in {*times} & {*after(robot)}
+            for at in after(robot)
         ]
 
     def begun(bar: float, learner: str, *times: int) -> list[Part]:
         return [at_most(bar, over_anew, evidence, ARM, SIMULATOR, at, learner, name=f"at {at}") for at in times]
 
-    shifts = ("offset-0.1", "offset-0.02", "gain")
     return [
-        Claim("Offset, gain, undone: half the error of starting anew at 100, 250: ratios ≤ 0.50",
-              parts(0.5, *shifts, "undone", times=(100, 250))),
-        Claim("Never worse than anew at 100 to 1000: ratios ≤ 1.05: offset, gain, gradual",
-              parts(1.05, *shifts, "gradual")),
-        *(Claim(f"... {change}", parts(1.05, change)) for change in ("stuck", "swap", "shift", "undone", "mirrored")),
-        Claim("The mean of all but mirrored and noise, at 100 to 1000: ratios ≤ 1.10",
-              [at_most(1.1, mean_over_anew, evidence, robot, at, name=f"{robot}, {at}")
+        Claim("The mean of all but mirrored and noise, at 100 to 1000: ratios to starting anew ≤ 1.08",
+              [at_most(1.08, mean_over_anew, evidence, robot, at, name=f"{robot}, {at}")
                for robot in ROBOTS for at in after(robot)]),
+        Claim("... the worst of them: ≤ 1.35", parts(1.35, *PARTIAL)),
         Claim("These changes are noticed: ≥ 0.95 of lives",
               [at_least(0.95, noticed, evidence, *ROBOTS)]),
         Claim("Noise: never worse than a learner that notices nothing: ratios ≤ 1.05",
               parts(1.05, "noise", other=BLIND)),
         Claim("Simulator: half the error at 50, 100: ratios ≤ 0.50", begun(0.5, GOES_ON, *BEGUN[:2])),
-        Claim("... never worse: ratios ≤ 1.03", begun(1.03, GOES_ON, *BEGUN)),
-        Claim("... nor with a wrong, mirrored one", begun(1.03, WRONG, *BEGUN)),
+        Claim("... never worse, nor with a wrong, mirrored one: ratios ≤ 1.03",
+              [*begun(1.03, GOES_ON, *BEGUN), *begun(1.03, WRONG, *BEGUN)]),
     ]  # fmt: skip

@@ -33,7 +33,7 @@ LEARNING: Final = checksum(REFERENCE)
 FILE: Final = "results.csv"
 ALIKE: Final = "process"  # inverse model that answers for every learner
 _RATIO: Final = ("ratio", "low", "high")
-_ASKED: Final = ("requests", "shown", "late", "late_own", "strong", "weak")
+_ASKED: Final = ("requests", "shown", "late", "late_own")
 # Of each table: the number of columns that form its key, and all columns, the key first. Keys of rows are unique.
 TABLES: Final[dict[str, tuple[int, tuple[str, ...]]]] = {
     FILE: (4, ("variant", "seed", "movements", "answer", "task", "error", "floor", "learning")),
@@ -172,29 +172,22 @@ def explored_rows(config: Config, run: Run) -> list[Row]:
 def asked_rows(config: Config, run: Run) -> list[Row]:
     """Rows of asked.csv: requests to each teacher that could be asked; none for a learner that does not ask.
 
-    ``late`` counts requests from movement 1000 on, ``late_own`` late requests in the teacher's half of T. ``strong``
-    and ``weak`` count requests in which the first dimension of the context is in the outer or inner third of its range.
+    ``late`` counts requests from movement 1000 on, ``late_own`` late requests in the teacher's half of T.
     """
     if config.teaching != "teachers":
         return []
     task = task_of(config)
-    contexts = task.environment.contexts
-    dim = contexts.dim
-    nothing: Any = dict.fromkeys(("index", "reply", "teacher", "wanted_0", f"wanted_{dim}"), ())
+    dim = task.environment.contexts.dim
+    nothing: Any = dict.fromkeys(("index", "reply", "teacher", f"wanted_{dim}"), ())
     asked = pd.DataFrame(run.requests or nothing)
     late = asked["index"] >= LATE
     low_half = asked[f"wanted_{dim}"] < middle(demonstrations_of(task, config.demonstrations)[0])
-    outwards = (
-        (2 * (asked["wanted_0"] - contexts.low[0]) / contexts.sides[0] - 1).abs() if dim else asked["index"] * np.nan
-    )
     counted = pd.DataFrame(
         {
             "requests": asked["index"] >= 0,
             "shown": asked["reply"] == "shown",
             "late": late,
             "late_own": late & (low_half == (asked["teacher"] == "low-half")),
-            "strong": outwards > 2 / 3,
-            "weak": outwards < 1 / 3,
         }
     )
     teachers = config["teachers"] or ("all",)

@@ -8,13 +8,9 @@ A variant on the rod has a plain name, on another task the name of the task at i
 from __future__ import annotations
 
 from collections.abc import Iterable
-from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
-
-from sgimd_torch.demonstrations import SHIPPED, load_demonstrations, save_demonstrations
-from sgimd_torch.files import make_folder
+from sgimd_torch.demonstrations import SHIPPED
 from suite import REFERENCES, TASKS, UNIFORM
 
 Variant = dict[str, Any]
@@ -45,9 +41,6 @@ VARIED: Final[Variant] = {**INVERSE, "exact_first": False}  # the same for imita
 LARGE: Final[Variant] = {"environment.task_space": 100.0}
 BASELINE: Final[Variant] = {"goals": "uniform", "inverse": "nearest", "search": "perturb"}  # standard baseline
 SCHOOL: Final = ("map-elites", "cma-mae")  # algorithms of quality diversity; they take no context
-CORNER: Final = Path("corner.npz")  # file of demonstrations nearest to one corner
-MANY: Final = Path("many.npz")  # file of the first demonstrations
-MADE: Final = (CORNER, MANY)  # files that ``make_subsets`` writes
 ONCE: Final[Variant] = {"teacher": "initial", "teacher.every": 1}  # at the start, one demonstration a movement
 PRACTICE: Final[Variant] = {"algorithm": "practice"}
 WIDE: Final[Variant] = {**PRACTICE, "explore.uniform": 1.0}  # the first movements are uniform, too
@@ -126,7 +119,6 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
             "sgim-d-large": SGIM_D,
             "sgim-d-uniform-large": {**SGIM_D, "goals": "uniform"},
             "sgim-d-absolute-large": {**SGIM_D, "goals.progress": "absolute"},
-            "uniform-nearest-taught-large": {**SGIM_D, **BASELINE},
             "sagg-riac-letter-large": SAGG_RIAC_LETTER,
             "sgim-d-letter-large": SGIM_D_LETTER,
         }.items()
@@ -180,7 +172,6 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
                     "teacher": "periodic",
                     "social.repeats": 10,
                 },
-                "practice-corner": {**TAUGHT, "demonstrations": CORNER},
             }.items()
         },
         "practice-taught": {**TAUGHT, **WHOLE, **FLOOR},
@@ -193,7 +184,6 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
             for name, line in {
                 "sgim-d-initial": {**SGIM_D, "teacher": "initial"},
                 "sgim-im": IM,
-                "sgim-im-83": {**IM, "demonstrations": MANY},
                 "sgim-im-cost-10": {**IM, "cost": 10.0},
                 **{f"sgim-acts-{number}": {**ACTS, "teachers": (f"demonstrator-{number}",)} for number in (1, 2)},
                 "sgim-acts-four": {**ACTS, "teachers": (*RECORDED, f"experiments.mislabelling:{MISLABELLING}")},
@@ -214,17 +204,3 @@ SEEDS: Final = {
 }
 # The second table, beside results.csv, that gets rows from the runs of an experiment.
 SMALL_TABLES: Final = {"asking": "asked.csv", **dict.fromkeys(("paper", "letter", "large"), "explored.csv")}
-
-
-def make_subsets(folder: Path) -> None:
-    """Write subsets of the shipped demonstrations: the 20 nearest to one corner, and the first 83 of 127.
-
-    Raises:
-        OSError: a file cannot be written.
-    """
-    everything = load_demonstrations()
-    outcomes = np.array([demonstration.outcome for demonstration in everything])
-    corner = np.linalg.norm(outcomes - outcomes.max(axis=0), axis=1).argsort()[:20]
-    make_folder(folder)
-    save_demonstrations(folder / CORNER, [everything[k] for k in corner])
-    save_demonstrations(folder / MANY, everything[:83])  # they already spread over the plane

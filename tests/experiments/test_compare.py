@@ -11,7 +11,6 @@ from compare import collect, compared, jobs_of, last_rows, made_rows, main
 from made_up import row
 from runs import ROOT, start
 from sgimd_torch import run, sgim_d_letter
-from sgimd_torch.demonstrations import load_demonstrations
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.extras.sweep.parallel import Machine, sweep
 from sgimd_torch.options.config import Config, words
@@ -21,7 +20,7 @@ from sgimd_torch.runs.build import build
 from sgimd_torch.runs.program import command
 from sgimd_torch.runs.read import Run, read_run
 from table import CORNER, LEARNING, explored_rows, merge, read_table, result_rows, task_name, tiles_reached
-from variants import EXPERIMENTS, MADE, VARIANTS, make_subsets
+from variants import EXPERIMENTS, VARIANTS
 
 # Two variants that live for 40 movements, and one, of an experiment of its own, whose demonstrations are missing.
 TINY = """
@@ -135,7 +134,7 @@ def test_a_run_that_ended_without_its_last_evaluation_is_no_result(go, benchmark
         (["--seeds", ""], "--seeds: must be like 5, 0-19 or 0,3,7-9, got ''"),
         (["--seeds=-1"], "--seeds: must be like 5, 0-19 or 0,3,7-9, got '-1'"),
         (["--processes", "0"], "--processes: must be a whole number of at least 1, got '0'"),
-        (["--out", "file/runs"], f"file/runs/{LEARNING}/demonstrations cannot be made: Not a directory"),
+        (["--out", "file/runs"], f"file/runs/{LEARNING}/random cannot be made: Not a directory"),
         (["--results", "file"], "file cannot be made: File exists; is a file in its place?"),
         (["--results", "foreign"], "foreign/results.csv.*must begin with variant,seed"),
     ],
@@ -222,15 +221,6 @@ def test_rows_of_the_letter_are_made_by_one_word(go, tmp_path):
     arm = ("--environment", "planar-arm-7", "--teacher.every", 20, "--movements", 60, "--evaluate-at", "[]")
     assert go(tmp_path, "--algorithm", "sgim-d-letter", *arm, "--benchmark", "null") == 0
     assert np.array_equal(read_run(tmp_path / "sgim-d-letter" / "seed-003").thetas, arm_life("sgim-d-letter"))
-
-
-def test_a_corner_is_twenty_neighbours_and_many_are_the_first(tmp_path):
-    make_subsets(tmp_path)
-    everything = load_demonstrations()
-    corner, many = (load_demonstrations(tmp_path / name, n_joints=6, outcome_dim=2) for name in MADE)
-    assert len(corner) == 20
-    assert np.ptp([shown.outcome for shown in corner], axis=0).max() < 1
-    assert [shown.trajectory.tobytes() for shown in many] == [shown.trajectory.tobytes() for shown in everything[:83]]
 
 
 def test_tiles_of_the_benchmark_that_were_reached_are_counted_once():

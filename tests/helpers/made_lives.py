@@ -20,7 +20,7 @@ def write_lives(folder, factor=lambda *key: 1.0, robots=60, seeds=8):
     for number in range(robots):
         for name in LEARNERS:
             for seed, at in product(SEEDS[name], COUNTS):
-                error = {"practice": 0.3, RANDOM: 1.0}.get(name, 0.8) * (1 + 0.002 * number) * (1 + 0.001 * (seed % 5))
+                error = {"practice": 0.25, RANDOM: 1.0}.get(name, 0.8) * (1 + 0.002 * number) * (1 + 0.001 * (seed % 5))
                 rows.append((number, name, seed, at, error * factor(number, name, at), 0))
     merge(folder, TABLE, [dict(zip(TABLES[TABLE][1], row, strict=False)) for row in rows])
     rows, goes_on = [], {**dict.fromkeys(AFTER, 0.4), 50: 0.4}
