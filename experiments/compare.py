@@ -3,7 +3,7 @@
 variants.py lists the variants. A run is in OUT/LEARNING/VARIANT/seed-003. After the run, results.csv in RESULTS gets a
 row for each of its evaluations by each inverse model. asked.csv gets the requests of learners that ask, and
 explored.csv the tiles reached and the goals chosen. `robots` and `changes` are lives on random robots, by number of the
-robot, and on robots that change; robots.csv and changes.csv get their rows.
+robot, and on robots that change, `others` those of other people's programs; each has a table.
 
 After Ctrl-C or a power cut, or for more seeds, start the command again: runs in the tables are not repeated, and
 stopped runs continue. If a run fails, the others continue. Rows of other learning (their last column tells) do not
@@ -30,6 +30,7 @@ with loading():  # Ctrl-C shows no traceback
 
     import changing
     import lives
+    import others
     import random_robots
     from lives import Life
     from sgimd_torch.extras.sweep.command import add_options, engine_of
@@ -42,11 +43,12 @@ with loading():  # Ctrl-C shows no traceback
     from table import FILE, LEARNING, ROWS, TABLES, Row, answers_of, merge, own_answer, read_table, result_rows
     from variants import EXPERIMENTS, SEEDS, SMALL_TABLES, Variant
 
-LIVES: Final = {"robots": random_robots, "changes": changing}
+LIVES: Final = {"robots": random_robots, "changes": changing, "others": others}
 NAMES: Final[dict[str, Collection[str]]] = {
     **EXPERIMENTS,
     "robots": random_robots.LEARNERS,
     "changes": (*changing.ROBOTS, changing.ARM),
+    "others": others.ROBOTS,
 }
 # Estimates of processor time (ms) of a movement, evaluations included. The order is that in which runs are made.
 COST: Final = {
@@ -60,6 +62,7 @@ COST: Final = {
     "model": 13.0,
     "changes": 4.0,
     "suite": 6.5,
+    "others": 4.0,
     "ladder": 8.0,
     "asking": 9.0,
 }
@@ -118,7 +121,7 @@ def hours(name: str, jobs: Sequence[Job]) -> float:
 def made_rows(results: Path) -> set[tuple[Any, ...]]:
     """Keys of the rows that the present learning has made; those of lives begin with the name of their table."""
     known = set[tuple[Any, ...]]()
-    for name in (FILE, random_robots.TABLE, changing.TABLE):
+    for name in (FILE, random_robots.TABLE, changing.TABLE, others.TABLE):
         table, (n_key, columns) = read_table(results, name), TABLES[name]
         keys = table[table["learning"] == LEARNING][[*columns[:n_key]]].itertuples(index=False, name=None)
         known |= {*keys} if name == FILE else {(name, *key[:-1]) for key in keys}

@@ -21,6 +21,8 @@ from table import LEARNING, read_table
 from variants import ARMS, EXPERIMENTS, VARIANTS
 
 MISSING_CELL: Final = "–"
+OURS: Final = "practice"
+OTHERS: Final = (OURS, "explauto", "pyribs-cma-me", "scikit-learn-process", "torch-network", "cma-es-each-goal")
 # Three variants of each rival: without a teacher, with a demonstration every 30 movements, with all at the start.
 RIVALS: Final[Mapping[str, tuple[str, str, str]]] = {
     "practice": ("practice", "practice-taught-every-30", "practice-taught"),
@@ -99,6 +101,7 @@ class Page:
         learning = {
             "robots": self.evidence.robots["learning"],
             "changes": self.evidence.changes["learning"],
+            "others": read_table(self.folder, "others.csv")["learning"],
             **{name: self.evidence.of_variants(variants) for name, variants in EXPERIMENTS.items()},
         }
         shares = {name: (learning[name] != LEARNING).mean() for name in groups if len(learning[name])}
@@ -223,6 +226,23 @@ class Page:
             rows.append([first, f"`{search}`", over, f"{ms:.1f}", f"{movements:.0f}", over_then])
         head = ("robot", "search", "error, equal movements", "ms", "movements, equal time", "error, equal time")
         return markdown(head, rows)
+
+    def others(self) -> str:
+        """Errors of other people's programs, by their own answers and by `process`, and times by the clock."""
+        table, rows = read_table(self.folder, "others.csv"), []
+        counts = sorted(set(table.movements))
+        for robot, name in product(dict.fromkeys(table.robot), OTHERS):
+            lives = table[(table.robot == robot) & (table.learner == name)]
+            if lives.empty:
+                self.missing.append(f"{name} on {robot}")
+                continue
+            cells = [
+                ", ".join(f"{interquartile_mean(at[column]):.3f}" for column in ("error", "ours")[: 2 - (name == OURS)])
+                for at in (lives[lives.movements == n] for n in counts)
+            ]
+            last = lives[lives.movements == counts[-1]]
+            rows.append([robot, f"`{name}`", *cells, f"{last.ms.median():.2g}, {last.ms_answer.median():.2g}"])
+        return markdown(("robot", "program", *map(str, counts), "ms: movement, answer"), rows)
 
     def asking(self) -> str:
         """Errors on the rod, and numbers of demonstrations, of learners that ask and of others; the best come first."""

@@ -45,6 +45,7 @@ TABLES: Final[dict[str, tuple[int, tuple[str, ...]]]] = {
         3,
         ("robot", "seed", "search", "movements", "seconds", "error", "movements_then", "seconds_then", "error_then"),
     ),
+    "others.csv": (4, ("robot", "learner", "seed", "movements", "error", "ours", "ms", "ms_answer", "learning")),
     "changes.csv": (5, ("robot", "change", "learner", "seed", "movements", "error", "noticed", "learning")),
 }
 TYPES: Final = {  # types of columns; all other columns have floats, and an empty field is NaN

@@ -5,6 +5,7 @@ Each robot is a `Toy`: boxes, and a function from context and theta to the outco
     two_elbows: two families of postures             spatial_arm: three outcome dimensions, in cm
     puck: a puck to hit; its place is the context    fetch: a ball to grasp and carry
     half_reached: half of T is out of reach          blind_toss: the toss, but the learner does not know the wind
+    soft_arm: nine tendons, three outcome dimensions
     sgimd run --environment experiments.toys:toss    # in the root folder of the repository
 
 The outcome of puck and fetch is the final place of an object. If a movement misses the object, the outcome does not
@@ -154,6 +155,33 @@ def spatial_arm(*, noise: float = 1.0) -> Task:
     middle = np.full(6, 0.5)
     space = Box.cube(-100, 100, 3, names=("x", "y", "height"), unit="cm")
     return toy_task(Toy(Box.cube(0, 1, 0), Box.cube(0, 1, 6), space, hand, middle, noise), 25.0)
+
+
+def soft_arm(*, noise: float = 0.005) -> Task:
+    """A soft arm of three segments, each bent and shortened by three tendons; each segment bends to an arc of a circle.
+
+    theta: pull of each of the nine tendons. Outcome: x, y, height of the tip (m); the arm hangs from 0 and is 1 m long.
+    """
+    around = 2 * np.pi * np.arange(3) / 3
+
+    def tip(context: Array, theta: Array) -> Array:
+        pulls = theta.reshape(*theta.shape[:-1], 3, 3)
+        lengths = (1 - 0.2 * pulls.mean(axis=-1)) / 3
+        bends = np.stack([pulls @ np.cos(around), pulls @ np.sin(around)], axis=-1)  # rad, about two axes
+        place, frame = np.zeros((*theta.shape[:-1], 3)), np.broadcast_to(np.eye(3), (*theta.shape[:-1], 3, 3))
+        for k in range(3):
+            ways, angle = bends[..., k, :], np.linalg.norm(bends[..., k, :], axis=-1, keepdims=True) + 1e-9
+            aside, length = ways / angle, lengths[..., k, None]
+            chord = np.concatenate([aside * (1 - np.cos(angle)), -np.sin(angle)], axis=-1) * length / angle
+            place = place + (frame @ chord[..., None])[..., 0]
+            axis = np.concatenate([-aside[..., 1:], aside[..., :1], np.zeros_like(angle)], axis=-1)
+            cross = np.cross(np.eye(3), axis[..., None, :])
+            turn = np.eye(3) - np.sin(angle)[..., None] * cross + (1 - np.cos(angle))[..., None] * (cross @ cross)
+            frame = frame @ turn
+        return place
+
+    space = Box(np.array([-0.8, -0.8, -1.0]), np.array([0.8, 0.8, 0.2]), ("x", "y", "height"), "m")
+    return toy_task(Toy(Box.cube(0, 1, 0), Box.cube(0, 1, 9), space, tip, np.zeros(9), noise), 0.1)
 
 
 def puck(*, noise: float = 0.005) -> Task:

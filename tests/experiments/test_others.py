@@ -1,0 +1,85 @@
+"""Other people's programs: each answers each goal in Pi, by what it has learnt."""
+
+import numpy as np
+import pytest
+
+import others
+from marks import slow
+from page_tables import Page
+from table import TABLES, merge
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return others.robot_of("arm-5")
+
+
+def live(name, robot, goals, n):
+    """A rival after ``n`` movements, and its distances from the goals by its answers, without noise."""
+    rival = others.RIVALS[name](robot, (goals - robot.outcomes.low) / robot.outcomes.sides, 1000)
+    rng = np.random.default_rng(0)
+    for _ in range(n):
+        theta = rival.move()
+        outcome = robot.execute([], theta, rng)
+        rival.tell(theta, (outcome - robot.outcomes.low) / robot.outcomes.sides)
+    answers = rival.answers()
+    rival.close()
+    assert answers.shape == (len(goals), robot.policies.dim)
+    assert ((answers >= 0) & (answers <= 1)).all()
+    return rival, np.linalg.norm(
+        [robot.execute([], theta, rng) - goal for theta, goal in zip(answers, goals, strict=True)], axis=1
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "better"),
+    [("scikit-learn-process", 0.8), slow("torch-network", 0.9), ("practice", 0.6), ("pyribs-cma-me", 9.0)],
+)
+def test_answers_of_a_program_are_those_of_its_movements_and_models_miss_less_than_the_nearest_one(arm, name, better):
+    rival, errors = live(name, *arm, 120)
+    nearest = np.array([rival.thetas[row] for row in rival.nearest(1)[:, 0]])
+    missed = np.linalg.norm([arm[0].execute([], theta, np.random.default_rng(1)) for theta in nearest] - arm[1], axis=1)
+    assert errors.mean() < better * missed.mean()
+
+
+def test_cma_es_has_one_goal_after_another_and_begins_where_it_came_nearest(arm):
+    rival, errors = live("cma-es-each-goal", *arm, 200)
+    assert errors.mean() < 0.3
+    generation = len(rival._asked)
+    assert len(rival._searches) == -(-200 // generation)
+    first = np.argmin(np.linalg.norm(np.array(rival.outcomes[:generation]) - rival.goals[1], axis=1))
+    np.testing.assert_allclose(rival._searches[1].x0, rival.thetas[first])
+
+
+@pytest.mark.skipif(not others.EXPLAUTO.exists(), reason="scripts/others installs Explauto")
+def test_explauto_learns_in_a_process_of_its_own(arm):
+    assert live("explauto", *arm, 150)[1].mean() < 0.15
+
+
+def test_without_explauto_a_line_says_how_to_install_it(arm, monkeypatch, tmp_path):
+    monkeypatch.setattr(others, "EXPLAUTO", tmp_path / "others/bin/python")
+    with pytest.raises(FileNotFoundError, match="run scripts/others"):
+        others.Explauto(*arm, 0)
+
+
+def test_the_table_has_both_answers_of_a_program_and_ours_once(tmp_path, few_draws):
+    columns = TABLES[others.TABLE][1]
+    rows = [
+        (robot, name, seed, at, 0.2, 0.1, 3.0, 4.0)
+        for robot in ("arm-5", "rod")
+        for name in ("practice", "explauto")
+        for seed in (1, 2)
+        for at in (50, 100)
+    ]
+    merge(tmp_path, others.TABLE, [dict(zip(columns, row, strict=False)) for row in rows])
+    page = Page(None, tmp_path)
+    table = page.others()
+    assert "| arm-5 | `practice` | 0.200 | 0.200 | 3, 4 |" in table
+    assert "| rod | `explauto` | 0.200, 0.100 | 0.200, 0.100 | 3, 4 |" in table
+    assert "torch-network on rod" in page.missing
+
+
+def test_a_life_has_an_error_by_both_answers_after_each_number_of_movements():
+    found = others.life("soft-arm", "cma-es-each-goal", 1000, counts=(40, 80))
+    assert list(found) == [40, 80]
+    assert all(0 < own < 1 and 0 < ours < own for own, ours, *_ in found.values())
