@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import cma
+import gymnasium
 import numpy as np
 import torch
 from scipy.optimize import minimize
@@ -33,6 +34,7 @@ from lives import Life
 from sgimd_torch.algorithms.practice import practice
 from sgimd_torch.environments.planar_arm import PlanarArm
 from sgimd_torch.environments.protocol import Environment
+from sgimd_torch.extras.models.mujoco_robot import MujocoRobot
 from sgimd_torch.extras.rivals.quality_diversity import cma_me_alone
 from sgimd_torch.inverses.local_process import LocalProcess
 from sgimd_torch.inverses.nearest import NearestNeighbour
@@ -61,6 +63,9 @@ def robot_of(name: str) -> tuple[Environment, Array]:
         task = load_word("environment", ROD)()
     elif name == "soft-arm":
         task = soft_arm()
+    elif name == "pusher-arm":
+        file = Path(gymnasium.__file__).parent / "envs" / "mujoco" / "assets" / "pusher.xml"
+        task = Task(MujocoRobot(file, outcome="body:tips_arm:xyz"))
     else:
         arm = PlanarArm(int(name.removeprefix("arm-")), noise=0.01)
         task = Task(arm, partial(arm_benchmark, arm))
@@ -68,7 +73,7 @@ def robot_of(name: str) -> tuple[Environment, Array]:
     return task.environment, goals[:: 1 + len(goals) // GOALS]
 
 
-ROBOTS: Final = ("arm-5", "arm-7", "arm-50", "soft-arm", "rod")
+ROBOTS: Final = ("arm-5", "arm-7", "arm-50", "soft-arm", "rod", "pusher-arm")
 
 
 class Rival:
