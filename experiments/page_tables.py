@@ -241,7 +241,14 @@ class Page:
                 for at in (lives[lives.movements == n] for n in counts)
             ]
             last = lives[lives.movements == counts[-1]]
-            rows.append([robot, f"`{name}`", *cells, f"{last.ms.median():.2g}, {last.ms_answer.median():.2g}"])
+            rows.append(
+                [
+                    f"{robot} ({len(last)})",
+                    f"`{name}`",
+                    *cells,
+                    f"{last.ms.median():.2g}, {last.ms_answer.median():.2g}",
+                ]
+            )
         return markdown(("robot", "program", *map(str, counts), "ms: movement, answer"), rows)
 
     def asking(self) -> str:
