@@ -227,29 +227,21 @@ class Page:
         head = ("robot", "search", "error, equal movements", "ms", "movements, equal time", "error, equal time")
         return markdown(head, rows)
 
-    def others(self) -> str:
-        """Errors of other people's programs, by their own answers and by `process`, and times by the clock."""
+    def other(self, robot: str, name: str, at: int, *columns: str) -> str:
+        """Errors of a program on a robot: of its own answers, "error", and of ours, "ours"."""
+        table = read_table(self.folder, "others.csv")
+        lives = table[(table.robot == robot) & (table.learner == name) & (table.movements == at)]
+        return (
+            ", ".join(f"{interquartile_mean(lives[column]):.3f}" for column in columns) if len(lives) else MISSING_CELL
+        )
+
+    def others(self, *counts: int) -> str:
+        """Errors of other people's programs, by their own answers and by `process`."""
         table, rows = read_table(self.folder, "others.csv"), []
-        counts = sorted(set(table.movements))
-        for robot, name in product(dict.fromkeys(table.robot), OTHERS):
-            lives = table[(table.robot == robot) & (table.learner == name)]
-            if lives.empty:
-                self.missing.append(f"{name} on {robot}")
-                continue
-            cells = [
-                ", ".join(f"{interquartile_mean(at[column]):.3f}" for column in ("error", "ours")[: 2 - (name == OURS)])
-                for at in (lives[lives.movements == n] for n in counts)
-            ]
-            last = lives[lives.movements == counts[-1]]
-            rows.append(
-                [
-                    f"{robot} ({len(last)})",
-                    f"`{name}`",
-                    *cells,
-                    f"{last.ms.median():.2g}, {last.ms_answer.median():.2g}",
-                ]
-            )
-        return markdown(("robot", "program", *map(str, counts), "ms: movement, answer"), rows)
+        for robot, at in product(dict.fromkeys(table.robot), counts):
+            cells = [self.other(robot, name, at, *("error", "ours")[: 2 - (name == OURS)]) for name in OTHERS]
+            rows.append([f"{robot}, {at}", *cells])
+        return markdown(("robot, movements", *(f"`{name}`" for name in OTHERS)), rows)
 
     def asking(self) -> str:
         """Errors on the rod, and numbers of demonstrations, of learners that ask and of others; the best come first."""

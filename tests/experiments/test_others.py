@@ -73,10 +73,10 @@ def test_the_table_has_both_answers_of_a_program_and_ours_once(tmp_path, few_dra
     ]
     merge(tmp_path, others.TABLE, [dict(zip(columns, row, strict=False)) for row in rows])
     page = Page(None, tmp_path)
-    table = page.others()
-    assert "| arm-5 (2) | `practice` | 0.200 | 0.200 | 3, 4 |" in table
-    assert "| rod (2) | `explauto` | 0.200, 0.100 | 0.200, 0.100 | 3, 4 |" in table
-    assert "torch-network on rod" in page.missing
+    table = page.others(50)
+    assert "| arm-5, 50 | 0.200 | 0.200, 0.100 | – | – | – | – |" in table
+    assert "| rod, 50 |" in table
+    assert ", 100 |" not in table
 
 
 def test_a_life_has_an_error_by_both_answers_after_each_number_of_movements():

@@ -27,7 +27,7 @@ from runs import (
 from sgimd_torch.evaluation import evaluate
 from sgimd_torch.inverses.locally_linear import LocallyLinear
 from sgimd_torch.record import Record
-from sgimd_torch.runs import build, evaluations
+from sgimd_torch.runs import evaluations, run_parts
 from sgimd_torch.runs import run as run_module
 from sgimd_torch.runs.command import main
 from sgimd_torch.runs.directory import RUN_FILE
@@ -167,7 +167,7 @@ def test_if_the_robot_now_has_other_goals_all_evaluations_are_repeated(tmp_path,
         return replace(benchmark, goals=others(benchmark.goals)), *rest
 
     before = read_run(copy)
-    monkeypatch.setattr(build, "benchmark_of", changed)
+    monkeypatch.setattr(run_parts, "benchmark_of", changed)
     assert go(tmp_path, "--resume") == 0
     assert "evaluations after 30, 60, 90 movements are dropped, or repeated" in capsys.readouterr().err
     now = read_run(copy)
