@@ -17,8 +17,12 @@ from sgimd_torch.files import write_text
 from table import TABLES, merge
 
 HERE: Final = str(Path(__file__).parent)
-MAKERS: Final = {"robots.csv": "random_robots", "changes.csv": "changing", "refinement.csv": "refinement",
-          "others.csv": "others"}  # fmt: skip
+MAKERS: Final = {
+    "robots.csv": "random_robots",
+    "changes.csv": "changing",
+    "refinement.csv": "refinement",
+    "others.csv": "others",
+}
 """Module of a table, with a function life(*key) -> the other columns of a row, by the last part of its key."""
 
 
