@@ -1,6 +1,7 @@
 """A tiny benchmark, a short run on it, and what that run records when nothing disturbs it."""
 
 import os
+import signal
 import sys
 
 import numpy as np
@@ -22,6 +23,8 @@ settings.register_profile("any clock", deadline=None, suppress_health_check=[Hea
 settings.load_profile("any clock")
 # MuJoCo is imported without OpenGL, as a display may be missing; pictures in space are made in processes of their own.
 os.environ.setdefault("MUJOCO_GL", "disable")
+# Programs that a shell starts in the background ignore Ctrl-C; tests send it.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")
