@@ -273,12 +273,13 @@ def life(robot: str, name: str, seed: int, *, counts: Collection[int] = COUNTS) 
     with closing(rival):
         for n in range(1, max(counts) + 1):
             begun = time.perf_counter()
-            theta = np.clip(rival.move(), 0, 1)
+            share = np.clip(rival.move(), 0, 1)
             learning += time.perf_counter() - begun
-            outcome = world.execute(NO_CONTEXT, policies.low + theta * policies.sides, rng)
-            memory.add(NO_CONTEXT, policies.low + theta * policies.sides, outcome)
+            theta = policies.low + share * policies.sides
+            outcome = world.execute(NO_CONTEXT, theta, rng)
+            memory.add(NO_CONTEXT, theta, outcome)
             begun = time.perf_counter()
-            rival.tell(theta, (outcome - outcomes.low) / outcomes.sides)
+            rival.tell(share, (outcome - outcomes.low) / outcomes.sides)
             learning += time.perf_counter() - begun
             if n in counts:
                 begun = time.perf_counter()

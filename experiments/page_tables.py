@@ -7,9 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import product
 from pathlib import Path
 from typing import Final
+
+import pandas as pd
 
 from claimed import SUITE, on, paper
 from evidence import LAST, Evidence, NotRun, Statistic
@@ -101,7 +104,7 @@ class Page:
         learning = {
             "robots": self.evidence.robots["learning"],
             "changes": self.evidence.changes["learning"],
-            "others": read_table(self.folder, "others.csv")["learning"],
+            "others": self.lives_of_others["learning"],
             **{name: self.evidence.of_variants(variants) for name, variants in EXPERIMENTS.items()},
         }
         shares = {name: (learning[name] != LEARNING).mean() for name in groups if len(learning[name])}
@@ -227,18 +230,22 @@ class Page:
         head = ("robot", "search", "error, equal movements", "ms", "movements, equal time", "error, equal time")
         return markdown(head, rows)
 
+    @cached_property
+    def lives_of_others(self) -> pd.DataFrame:
+        """The table of other people's programs."""
+        return read_table(self.folder, "others.csv")
+
     def other(self, robot: str, name: str, at: int, *columns: str) -> str:
         """Errors of a program on a robot: of its own answers, "error", and of ours, "ours"."""
-        table = read_table(self.folder, "others.csv")
+        table = self.lives_of_others
         lives = table[(table.robot == robot) & (table.learner == name) & (table.movements == at)]
-        return (
-            ", ".join(f"{interquartile_mean(lives[column]):.3f}" for column in columns) if len(lives) else MISSING_CELL
-        )
+        numbers = [f"{interquartile_mean(lives[column]):.3f}" for column in columns if len(lives)]
+        return ", ".join(numbers) or MISSING_CELL
 
     def others(self, *counts: int) -> str:
         """Errors of other people's programs, by their own answers and by `process`."""
-        table, rows = read_table(self.folder, "others.csv"), []
-        for robot, at in product(dict.fromkeys(table.robot), counts):
+        rows = []
+        for robot, at in product(dict.fromkeys(self.lives_of_others.robot), counts):
             cells = [self.other(robot, name, at, *("error", "ours")[: 2 - (name == OURS)]) for name in OTHERS]
             rows.append([f"{robot}, {at}", *cells])
         return markdown(("robot, movements", *(f"`{name}`" for name in OTHERS)), rows)
