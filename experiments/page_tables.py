@@ -25,7 +25,10 @@ from variants import ARMS, EXPERIMENTS, VARIANTS
 
 MISSING_CELL: Final = "–"
 OURS: Final = "practice"
-OTHERS: Final = (OURS, "explauto", "pyribs-cma-me", "scikit-learn-process", "torch-network", "cma-es-each-goal")
+OTHERS: Final = (
+    *(OURS, "explauto", "pyribs-cma-me", "scikit-learn-process", "torch-network", "cma-es-each-goal"),
+    "botorch-each-goal",
+)
 # Three variants of each rival: without a teacher, with a demonstration every 30 movements, with all at the start.
 RIVALS: Final[Mapping[str, tuple[str, str, str]]] = {
     "practice": ("practice", "practice-taught-every-30", "practice-taught"),

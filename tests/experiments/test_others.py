@@ -16,12 +16,13 @@ def arm():
 
 def live(name, robot, goals, n):
     """A rival after ``n`` movements, and its distances from the goals by its answers, without noise."""
-    rival = others.RIVALS[name](robot, (goals - robot.outcomes.low) / robot.outcomes.sides, 1000)
+    none = np.zeros((len(goals), 0))
+    rival = others.RIVALS[name](robot, none, (goals - robot.outcomes.low) / robot.outcomes.sides, 1000)
     rng = np.random.default_rng(0)
     for _ in range(n):
-        theta = rival.move()
+        theta = rival.move(none[0])
         outcome = robot.execute([], theta, rng)
-        rival.tell(theta, (outcome - robot.outcomes.low) / robot.outcomes.sides)
+        rival.tell(none[0], theta, (outcome - robot.outcomes.low) / robot.outcomes.sides)
     answers = rival.answers()
     rival.close()
     assert answers.shape == (len(goals), robot.policies.dim)
@@ -37,7 +38,7 @@ def live(name, robot, goals, n):
 )
 def test_answers_of_a_program_are_those_of_its_movements_and_models_miss_less_than_the_nearest_one(arm, name, better):
     rival, errors = live(name, *arm, 120)
-    nearest = np.array([rival.thetas[row] for row in rival.nearest(1)[:, 0]])
+    nearest = rival.begins(1)[:, 0]
     missed = np.linalg.norm([arm[0].execute([], theta, np.random.default_rng(1)) for theta in nearest] - arm[1], axis=1)
     assert errors.mean() < better * missed.mean()
 
@@ -48,7 +49,7 @@ def test_cma_es_has_one_goal_after_another_and_begins_where_it_came_nearest(arm)
     generation = len(rival._asked)
     assert len(rival._searches) == -(-200 // generation)
     first = np.argmin(np.linalg.norm(np.array(rival.outcomes[:generation]) - rival.goals[1], axis=1))
-    np.testing.assert_allclose(rival._searches[1].x0, rival.thetas[first])
+    np.testing.assert_allclose(rival._searches[1].x0, rival.tries[first])
 
 
 @pytest.mark.skipif(not others.EXPLAUTO.exists(), reason="scripts/others installs Explauto")
@@ -56,10 +57,41 @@ def test_explauto_learns_in_a_process_of_its_own(arm):
     assert live("explauto", *arm, 150)[1].mean() < 0.15
 
 
+def test_botorch_takes_the_movement_that_it_expects_to_improve_most(arm):
+    pytest.importorskip("botorch", reason="scripts/others installs BoTorch")
+    rival, errors = live("botorch-each-goal", *arm, 30)
+    assert errors.mean() < 0.3
+    misses = [np.linalg.norm(rival.outcomes[n] - rival.goals[n % len(rival.goals)]) for n in range(30)]
+    assert np.mean(misses[20:]) < 0.8 * np.mean(misses[:20])  # the first twenty are random
+
+
+def test_mink_knows_the_arm_and_misses_by_its_noise_alone(arm):
+    assert live("mink", *arm, 3)[1].mean() < 0.02
+
+
+@pytest.mark.parametrize("name", ["practice", "scikit-learn-process", slow("torch-network")])
+def test_a_program_that_takes_contexts_answers_each_goal_in_its_own(name):
+    robot, goals = others.robot_of("toss")
+    winds, rng = np.linspace(0, 1, len(goals))[:, None], np.random.default_rng(0)
+    low, high = robot.contexts.low, robot.contexts.high
+    rival = others.RIVALS[name](robot, winds, (goals - robot.outcomes.low) / robot.outcomes.sides, 1000)
+    for _ in range(200):
+        wind = rng.random(1)
+        theta = rival.move(wind)
+        outcome = robot.execute(low + wind * (high - low), theta, rng)
+        rival.tell(wind, theta, (outcome - robot.outcomes.low) / robot.outcomes.sides)
+
+    def error(blowing):
+        landed = [robot.execute(*try_, rng) for try_ in zip(low + blowing * (high - low), rival.answers(), strict=True)]
+        return np.linalg.norm(np.array(landed) - goals, axis=1).mean()
+
+    assert error(winds) < 0.8 * error(winds[::-1])
+
+
 def test_without_explauto_a_line_says_how_to_install_it(arm, monkeypatch, tmp_path):
     monkeypatch.setattr(others, "EXPLAUTO", tmp_path / "others/bin/python")
     with pytest.raises(FileNotFoundError, match="run scripts/others"):
-        others.Explauto(*arm, 0)
+        others.Explauto(arm[0], np.zeros((len(arm[1]), 0)), arm[1], 0)
 
 
 def test_the_table_has_both_answers_of_a_program_and_ours_once(tmp_path, few_draws):
