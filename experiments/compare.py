@@ -63,7 +63,6 @@ COST: Final = {
     "changes": 4.0,
     "suite": 6.5,
     "others": 4.0,
-    "ladder": 8.0,
     "asking": 9.0,
 }
 EXAMPLES: Final = f"""experiments: {", ".join(COST)}

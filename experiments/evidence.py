@@ -138,17 +138,6 @@ class Evidence:
 
         return _found(mean, *(self.at(name, at) for name in (*ours, *theirs)), level=level)
 
-    def time_to_reach(self, ours: str, theirs: str, *, level: Level = LEVEL) -> Interval:
-        """Number of movements after which our error is as small as their last error; 2 ``LAST`` if it never is."""
-        curve = self.curve(ours)
-        movements = curve.columns.to_numpy(np.float64)
-
-        def time(curves: Array, errors: Array) -> Array:
-            means = interquartile_mean(np.swapaxes(curves, -1, -2))
-            return np.minimum(movements_to_reach(movements, means, interquartile_mean(errors)), 2 * LAST)
-
-        return _found(time, curve, self.at(theirs), level=level)
-
     def count(self, table: str, name: str, column: str, *, level: Level = LEVEL) -> Interval:
         """The interquartile mean of a column of explored.csv or asked.csv."""
         return _found(interquartile_mean, self.counts(table, name, column), level=level)
@@ -217,27 +206,6 @@ def shared(ours: pd.Series, theirs: pd.Series) -> tuple[pd.Series, pd.Series]:
     if len(seeds) < 2:
         raise NotRun("fewer than two seeds in common")
     return ours.loc[seeds], theirs.loc[seeds]
-
-
-def movements_to_reach(movements: Array, errors: Array, level: Array | float) -> Array:
-    """Number of movements at which the error first falls to a level; errors between evaluations are interpolated.
-
-    Args:
-        movements: ``(n,)`` numbers of movements at the evaluations, increasing.
-        errors: ``(..., n)`` errors (m) at the evaluations.
-        level: ``(...)`` level of the error (m).
-
-    Returns:
-        ``(...)`` numbers of movements, at least the first of ``movements``; inf if the level is never reached.
-    """
-    level = np.asarray(level, dtype=np.float64)[..., None]
-    reached = errors <= level
-    after = np.clip(reached.argmax(axis=-1, keepdims=True), 1, None)
-    high, low = (np.take_along_axis(errors, after - step, axis=-1) for step in (1, 0))
-    fall = np.where(high > low, high - low, 1.0)
-    share = np.clip((high - level) / fall, 0, 1)  # 0 if the error at the first evaluation is low enough
-    times = movements[after - 1] + share * (movements[after] - movements[after - 1])
-    return np.where(reached.any(axis=-1), times[..., 0], np.inf)
 
 
 def _matched(ours: pd.Series, theirs: pd.Series) -> tuple[pd.Series, pd.Series, bool]:

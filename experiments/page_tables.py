@@ -116,10 +116,6 @@ class Page:
         older = [f"{share:.0%} of `{name}`".replace("%", " %") for name, share in shares.items() if share]
         return f"**{'All rows' if min(shares.values()) == 1 else ', '.join(older)}: made by an earlier version.**"
 
-    def made_earlier(self, *variants: str) -> bool:
-        """Whether an earlier version has made rows of these variants."""
-        return bool((self.evidence.of_variants(variants) != LEARNING).any())
-
     def ratio(self, ours: str, theirs: str, at: int = LAST) -> str:
         """Our error divided by theirs, with the interval of this ratio."""
         return self.cell(self.evidence.ratio, ours, theirs, at, form=".2f", between=True)
@@ -188,18 +184,6 @@ class Page:
             mean = self._over_tasks(name, SUITE, 1000) if on_suite else ""
             rows.append([step, self.error(name, 1000, between=True), self.error(name), mean])
         return markdown(("step", "rod, 1000 (m)", "rod, 5000 (m)", "suite, 1000"), rows)
-
-    def steps(self) -> str:
-        """Errors at each step from the letter of the paper to our defaults, in the small and in the large T."""
-        rows = []
-        small = [name for name in EXPERIMENTS["ladder"] if not name.endswith("-large")]
-        both = [[f"{name}{end}" for name in ("sgim-d-letter", *small, "sgim-d")] for end in ("", "-large")]
-        for name, large in zip(*both, strict=True):
-            own = " by linear" if name.startswith("ladder") else ""
-            if name.endswith(("letter", "limits")):
-                own = " by paper"
-            rows.append([f"`{name}`", *(self.error(variant) for variant in (f"{name}{own}", name, large))])
-        return markdown(("step", "T, by its own answer", "T, by `process`", "large T, by `process`"), rows)
 
     def models(self) -> str:
         """Errors (m) of SGIM-D with and without a forward model; in the last column `process` answers for all."""

@@ -25,17 +25,6 @@ SHORT: Final[Variant] = {"movements": 2000, "evaluate_at": (250, 500, 1000, 2000
 FLOOR: Final[Variant] = {"floor_at": (5000,), "repeats": 3}  # measures the noise floor, too
 SGIM_D_LETTER: Final[Variant] = {"algorithm": "sgim-d-letter"}
 SAGG_RIAC_LETTER: Final[Variant] = {"algorithm": "sagg-riac-letter"}
-# Steps from there to our defaults, one change at a time: name, options.
-STEPS: Final[tuple[tuple[str, Variant], ...]] = (
-    ("limits", {"global_range": (0.05, 0.95), "social.exact_first": True}),
-    ("inverse", {"inverse": "linear"}),
-    ("simplex", {"search.complete": False, "search.xatol": 0.1, "search.fatol": 0.05}),
-    ("budget", {"budget": 15}),
-    ("noise", {"search.noise": 0.05}),
-    ("progress", {"goals.progress": "gained"}),
-    ("giving-up", {"give_up": -0.5}),
-    ("slivers", {"goals.max_aspect": 5.0}),  # then the inverse model `process` leads to our defaults
-)
 INVERSE: Final[Variant] = {"inverse": "paper"}  # the letter of the paper for learners without goals
 VARIED: Final[Variant] = {**INVERSE, "exact_first": False}  # the same for imitation
 LARGE: Final[Variant] = {"environment.task_space": 100.0}
@@ -92,14 +81,6 @@ def _on_tasks(learners: dict[str, Variant], tasks: Iterable[str]) -> dict[str, V
     }
 
 
-def _ladder(ending: str, where: Variant) -> dict[str, Variant]:
-    """The steps between the letter of the paper, ``sgim-d-letter``, and our defaults, ``sgim-d``."""
-    ladder, line = {}, {**SGIM_D_LETTER, **where, **END}
-    for number, (step, changed) in enumerate(STEPS):
-        ladder[f"ladder-{number}-{step}{ending}"] = line = {**line, **changed}
-    return ladder
-
-
 EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
     "paper": {
         **{name: {"algorithm": name, **WHOLE} for name in ("random", "sagg-riac", "observation", "imitation")},
@@ -129,7 +110,6 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
         for teacher in (1, 2)
         for name, line in _of_teacher(teacher, ending).items()
     },
-    "ladder": {**_ladder("", {}), **_ladder("-large", LARGE)},
     "rivals": {
         name: {**line, **WHOLE}
         for name, line in {
@@ -195,12 +175,10 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
     },
 }
 VARIANTS: Final = {name: line for variants in EXPERIMENTS.values() for name, line in variants.items()}
-# Seeds of each experiment, set out before the first was used: twenty where the paper's claims are judged, else ten;
-# five for the ladder, on which there is no claim.
+# Seeds of each experiment, set out before the first was used: twenty where the paper's claims are judged, else ten.
 SEEDS: Final = {
     **dict.fromkeys(EXPERIMENTS, range(280, 290)),
     **dict.fromkeys(("paper", "letter"), range(280, 300)),
-    "ladder": range(280, 285),
 }
 # The second table, beside results.csv, that gets rows from the runs of an experiment.
 SMALL_TABLES: Final = {"asking": "asked.csv", **dict.fromkeys(("paper", "letter", "large"), "explored.csv")}

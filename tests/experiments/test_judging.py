@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from evidence import Evidence, movements_to_reach
+from evidence import Evidence
 from judging import Claim, at_least, at_most, holm, judge
 from made_up import row, write, write_rows
 from sgimd_torch.extras.table.statistics import Interval
@@ -80,13 +80,6 @@ def test_claims_that_were_not_run_do_not_count_among_the_others(tmp_path):
     claim = Claim("SGIM-D errs less", [at_most(0, found.difference, "sgim-d", "random")])
     missing = Claim("nobody errs less", [at_most(0, found.difference, "nobody", "random")])
     assert [each.verdict for each in judge([claim, missing])] == ["holds", "not run"]
-
-
-def test_a_level_is_reached_where_the_line_between_evaluations_first_crosses_it():
-    movements = np.array([250.0, 500, 1000, 2000])
-    errors = np.array([[4.0, 3, 1, 2], [1, 1, 1, 1], [4, 4, 4, 3], [2, 4, 2, 1]])
-    np.testing.assert_allclose(movements_to_reach(movements, errors, 2.0), [750, 250, np.inf, 250])
-    np.testing.assert_allclose(movements_to_reach(movements, errors[:2], [3.5, 0.5]), [375, np.inf])
 
 
 def test_holm_by_intervals_is_holm_by_p_values():

@@ -90,7 +90,7 @@ def test_rows_of_ones_own_make_pages_and_leave_the_readme_alone(tmp_path, monkey
     assert "| **holds** |" in Path("mine/CURIOSITY.md").read_text()
     said = capsys.readouterr()
     assert "CURIOSITY: 4 holds" in said.out
-    assert re.search("CURIOSITY: not run: .*; sgim-d-letter at 5000", said.err)
+    assert re.search("CURIOSITY: not run: .*; sgim-d-letter-large at 5000", said.err)
     assert [path.name for path in tmp_path.iterdir()] == ["mine"]
 
 
@@ -110,10 +110,8 @@ def test_a_page_names_the_groups_whose_rows_are_not_all_of_this_learning(tmp_pat
     said = "**75 % of `paper`, 100 % of `letter`: made by an earlier version.**"
     assert page.older("paper", "letter", "large", "robots") == said
     assert page.older("letter") == "**All rows: made by an earlier version.**"
-    assert page.made_earlier("sgim-d-letter")
     page = Page(Evidence.of(write(tmp_path, rows[:1])), tmp_path)
     assert page.older("paper") == ""
-    assert not page.made_earlier("random")
 
 
 @pytest.mark.usefixtures("few_draws")
