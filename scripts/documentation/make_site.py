@@ -59,6 +59,7 @@ def names() -> str:
     rows = ["# What `from sgimd_torch import` offers", "", "| name | what it is |", "| --- | --- |"]
     for name in sorted({*dir(sgimd_torch)} - {"__version__"}, key=str.lower):
         thing = getattr(sgimd_torch, name)
+        thing = getattr(thing, "func", thing)  # of which it is a partial application, in the same module
         first = " ".join(thing.__doc__.split()).partition(". ")[0].replace("[", r"\[")
         rows.append(f"| [`{name}`][{thing.__module__}.{name}] | {first} |")
     return "\n".join(rows)
