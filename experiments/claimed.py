@@ -110,7 +110,7 @@ def paper(evidence: Evidence, *, letter: bool) -> list[Claim]:
               [at_least(1.0, evidence.growth_ratio, (sagg_riac, sagg_riac_large), (sgim_d, large))],
               "The teacher shows SGIM-D the part within reach."),
         Claim("... the error of SGIM-D is little larger than in the small T: ratio ≤ 1.20",
-              [at_most(1.2, evidence.ratio, large, sgim_d)], "The error is about a fifth larger."),
+              [at_most(1.2, evidence.ratio, large, sgim_d)], "The error is a tenth to a third larger."),
         Claim("... and smaller than those of SAGG-RIAC and Random: two differences < 0",
               [*less(evidence, large, sagg_riac_large, name="SAGG-RIAC"),
                *less(evidence, large, random, name="Random")],
