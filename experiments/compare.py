@@ -52,12 +52,12 @@ NAMES: Final[dict[str, Collection[str]]] = {
 }
 # Estimates of processor time (ms) of a movement, evaluations included. The order is that in which runs are made.
 COST: Final = {
-    "paper": 6.0,
-    "letter": 7.0,
-    "large": 9.0,
+    "paper": 3.0,
+    "letter": 5.0,
+    "large": 6.0,
     "teachers": 6.0,
-    "practice": 6.0,
-    "robots": 10.0,
+    "practice": 5.5,
+    "robots": 4.0,
     "rivals": 5.0,
     "model": 13.0,
     "changes": 4.0,
