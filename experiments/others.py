@@ -131,13 +131,12 @@ class GaussianProcess(Rival):
 
     def answers(self) -> Array:
         tries, outcomes, dim = np.array(self.tries), np.array(self.outcomes), self.dim
-        smooth = Matern(np.ones(self.fixed + dim), (0.05, 100), nu=2.5)
+        smooth = Matern(np.full(self.fixed + dim, dim**0.5), (0.05, 1000), nu=2.5)
         kernel = ConstantKernel() * smooth + WhiteKernel(1e-3, (1e-8, 1))
-        some = self.rng.permutation(len(tries))[:FITTED]
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ConvergenceWarning)  # of a robot without noise, or a parameter of no effect
             chosen = GaussianProcessRegressor(kernel, normalize_y=True, random_state=self.seed)
-            chosen.fit(tries[some], outcomes[some])
+            chosen.fit(tries[:FITTED], outcomes[:FITTED])
         process = GaussianProcessRegressor(chosen.kernel_, normalize_y=True, optimizer=None).fit(tries, outcomes)
         steps = 1e-4 * np.concatenate((np.zeros((1, dim)), np.eye(dim)))
 
@@ -161,7 +160,7 @@ class Network(Rival):
     def answers(self) -> Array:
         torch.manual_seed(self.seed)
         tries, outcomes = (torch.tensor(np.array(rows), dtype=torch.float32) for rows in (self.tries, self.outcomes))
-        n_in, n_out = tries.shape[1], outcomes.shape[1]
+        n_in, n_out, mean, sd = tries.shape[1], outcomes.shape[1], outcomes.mean(0), outcomes.std(0)
         network = torch.nn.Sequential(
             *(torch.nn.Linear(n_in, 128), torch.nn.Tanh(), torch.nn.Linear(128, 128), torch.nn.Tanh()),
             torch.nn.Linear(128, n_out),
@@ -170,7 +169,7 @@ class Network(Rival):
         schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, 2000)
         for _ in range(2000):
             rows = torch.randint(len(tries), (min(128, len(tries)),))
-            loss = (network(2 * tries[rows] - 1) - outcomes[rows]).square().mean()
+            loss = (network(2 * tries[rows] - 1) - (outcomes[rows] - mean) / sd).square().mean()
             optimiser.zero_grad()
             loss.backward()
             optimiser.step()
@@ -182,7 +181,8 @@ class Network(Rival):
         descent = torch.optim.Adam([found], 1e-2)
         for _ in range(200):
             descent.zero_grad()
-            (network(2 * torch.cat((contexts, found), dim=1) - 1) - goals).square().sum().backward()
+            missed = sd * network(2 * torch.cat((contexts, found), dim=1) - 1) + mean - goals
+            missed.square().sum().backward()
             descent.step()
             found.data.clamp_(0, 1)
         return found.detach().double().numpy()
@@ -292,7 +292,7 @@ class EachGoal(Rival):
             self._goal = (self._goal + 1) % len(self.goals)
             if self._goal not in self._searches:
                 begin = self.answers()[self._goal] if self.tries else np.full(self.dim, 0.5)
-                options = {"bounds": [0, 1], "verbose": -9, "seed": self.seed + 1}
+                options = {"bounds": [0, 1], "verbose": -9, "seed": 1 + self.seed * len(self.goals) + self._goal}
                 self._searches[self._goal] = cma.CMAEvolutionStrategy(begin, self.sd, options)
             self._asked, self._misses = self._searches[self._goal].ask(), []
         return np.asarray(self._asked[len(self._misses)])
