@@ -123,8 +123,8 @@ def test_the_lowest_versions_allowed_install_together_and_pass(tmp_path):
 
 SMOKE = (
     *("memory/test_memory.py", "learner/test_strategies.py", "learner/test_session.py", "test_loaders.py"),
-    *("environments", "goals", "inverses", "rivals", "forward_model", "board", "figures"),
-    *("runs/test_run.py", "views/test_film.py"),
+    *("environments", "goals", "inverses", "forward_model", "board"),
+    *("runs/test_run.py", "extras/rivals", "extras/film/test_film.py"),
 )
 
 
