@@ -131,12 +131,16 @@ class GaussianProcess(Rival):
 
     def answers(self) -> Array:
         tries, outcomes, dim = np.array(self.tries), np.array(self.outcomes), self.dim
-        smooth = Matern(np.full(self.fixed + dim, dim**0.5), (0.05, 1000), nu=2.5)
-        kernel = ConstantKernel() * smooth + WhiteKernel(1e-3, (1e-8, 1))
+        begun = [  # at short and at long lengths
+            ConstantKernel() * Matern(np.full(self.fixed + dim, length), (0.05, 1000), nu=2.5)
+            + WhiteKernel(1e-3, (1e-8, 1))
+            for length in (1.0, dim**0.5)
+        ]
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ConvergenceWarning)  # of a robot without noise, or a parameter of no effect
-            chosen = GaussianProcessRegressor(kernel, normalize_y=True, random_state=self.seed)
-            chosen.fit(tries[:FITTED], outcomes[:FITTED])
+            fits = [GaussianProcessRegressor(kernel, normalize_y=True) for kernel in begun]
+            fits = [fit.fit(tries[:FITTED], outcomes[:FITTED]) for fit in fits]
+        chosen = max(fits, key=lambda fit: fit.log_marginal_likelihood_value_)
         process = GaussianProcessRegressor(chosen.kernel_, normalize_y=True, optimizer=None).fit(tries, outcomes)
         steps = 1e-4 * np.concatenate((np.zeros((1, dim)), np.eye(dim)))
 
