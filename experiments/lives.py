@@ -21,7 +21,7 @@ MAKERS: Final = {
     "robots.csv": "random_robots",
     "changes.csv": "changing",
     "refinement.csv": "refinement",
-    "others.csv": "others",
+    "others.csv": "other_programs",
 }
 """Module of a table, with a function life(*key) -> the other columns of a row, by the last part of its key."""
 

@@ -17,6 +17,8 @@ import pandas as pd
 from claimed import SUITE, on, paper
 from evidence import LAST, Evidence, NotRun, Statistic
 from judging import MISSING, Claim, Verdict, judge
+from others import KNOWS, OURS, PROGRAMS
+from others import TABLE as OTHERS
 from refinement import ROBOTS, SEARCHES, TABLE
 from sgimd_torch.extras.table.statistics import interquartile_mean, interval_text
 from suite import TASKS, UNIFORM, titled
@@ -24,11 +26,6 @@ from table import LEARNING, read_table
 from variants import ARMS, EXPERIMENTS, VARIANTS
 
 MISSING_CELL: Final = "–"
-OURS: Final = "practice"
-OTHERS: Final = (
-    *(OURS, "explauto", "pyribs-cma-me", "scikit-learn-process", "torch-network", "cma-es-each-goal"),
-    "botorch-each-goal",
-)
 # Three variants of each rival: without a teacher, with a demonstration every 30 movements, with all at the start.
 RIVALS: Final[Mapping[str, tuple[str, str, str]]] = {
     "practice": ("practice", "practice-taught-every-30", "practice-taught"),
@@ -220,7 +217,7 @@ class Page:
     @cached_property
     def lives_of_others(self) -> pd.DataFrame:
         """The table of other people's programs."""
-        return read_table(self.folder, "others.csv")
+        return read_table(self.folder, OTHERS)
 
     def other(self, robot: str, name: str, at: int, *columns: str) -> str:
         """Errors of a program on a robot: of its own answers, "error", and of ours, "ours"."""
@@ -231,11 +228,11 @@ class Page:
 
     def others(self, *counts: int) -> str:
         """Errors of other people's programs, by their own answers and by `process`."""
-        rows = []
+        rows, names = [], [name for name in PROGRAMS if name != KNOWS]
         for robot, at in product(dict.fromkeys(self.lives_of_others.robot), counts):
-            cells = [self.other(robot, name, at, *("error", "ours")[: 2 - (name == OURS)]) for name in OTHERS]
+            cells = [self.other(robot, name, at, *("error", "ours")[: 2 - (name == OURS)]) for name in names]
             rows.append([f"{robot}, {at}", *cells])
-        return markdown(("robot, movements", *(f"`{name}`" for name in OTHERS)), rows)
+        return markdown(("robot, movements", *(f"`{name}`" for name in names)), rows)
 
     def asking(self) -> str:
         """Errors on the rod, and numbers of demonstrations, of learners that ask and of others; the best come first."""

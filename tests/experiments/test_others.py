@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import other_programs as programs
 import others
 from marks import slow
 from page_tables import Page
@@ -11,25 +12,29 @@ from table import TABLES, merge
 
 @pytest.fixture(scope="module")
 def arm():
-    return others.robot_of("arm-5")
+    return programs.robot_of("arm-5")
 
 
-def live(name, robot, goals, n):
-    """A rival after ``n`` movements, and its distances from the goals by its answers, without noise."""
-    none = np.zeros((len(goals), 0))
-    rival = others.RIVALS[name](robot, none, (goals - robot.outcomes.low) / robot.outcomes.sides, 1000)
+def live(name, robot, goals, n, contexts=None):
+    """A rival after ``n`` movements, and its distances from the goals by its answers, each in its context."""
+    contexts = np.zeros((len(goals), 0)) if contexts is None else contexts
+    rival = programs.RIVALS[name](robot, contexts, programs._into(robot.outcomes, goals), 1000)
     rng = np.random.default_rng(0)
     for _ in range(n):
-        theta = rival.move(none[0])
-        outcome = robot.execute([], theta, rng)
-        rival.tell(none[0], theta, (outcome - robot.outcomes.low) / robot.outcomes.sides)
+        context = rng.random(robot.contexts.dim)
+        theta = rival.move(context)
+        outcome = robot.execute(programs._out_of(robot.contexts, context), theta, rng)
+        rival.tell(context, theta, programs._into(robot.outcomes, outcome))
     answers = rival.answers()
     rival.close()
     assert answers.shape == (len(goals), robot.policies.dim)
     assert ((answers >= 0) & (answers <= 1)).all()
-    return rival, np.linalg.norm(
-        [robot.execute([], theta, rng) - goal for theta, goal in zip(answers, goals, strict=True)], axis=1
-    )
+    return rival, missed(robot, contexts, answers, goals, rng)
+
+
+def missed(robot, contexts, thetas, goals, rng):
+    movements = zip(programs._out_of(robot.contexts, contexts), thetas, strict=True)
+    return np.linalg.norm([robot.execute(*movement, rng) for movement in movements] - goals, axis=1)
 
 
 @pytest.mark.parametrize(
@@ -39,8 +44,8 @@ def live(name, robot, goals, n):
 def test_answers_of_a_program_are_those_of_its_movements_and_models_miss_less_than_the_nearest_one(arm, name, better):
     rival, errors = live(name, *arm, 120)
     nearest = rival.begins(1)[:, 0]
-    missed = np.linalg.norm([arm[0].execute([], theta, np.random.default_rng(1)) for theta in nearest] - arm[1], axis=1)
-    assert errors.mean() < better * missed.mean()
+    without = missed(arm[0], np.zeros((len(nearest), 0)), nearest, arm[1], np.random.default_rng(1))
+    assert errors.mean() < better * without.mean()
 
 
 def test_cma_es_has_one_goal_after_another_and_begins_where_it_came_nearest(arm):
@@ -52,7 +57,7 @@ def test_cma_es_has_one_goal_after_another_and_begins_where_it_came_nearest(arm)
     np.testing.assert_allclose(rival._searches[1].x0, rival.tries[first])
 
 
-@pytest.mark.skipif(not others.EXPLAUTO.exists(), reason="scripts/others installs Explauto")
+@pytest.mark.skipif(not programs.EXPLAUTO.exists(), reason="scripts/others installs Explauto")
 def test_explauto_learns_in_a_process_of_its_own(arm):
     assert live("explauto", *arm, 150)[1].mean() < 0.15
 
@@ -71,27 +76,25 @@ def test_mink_knows_the_arm_and_misses_by_its_noise_alone(arm):
 
 @pytest.mark.parametrize("name", ["practice", "scikit-learn-process", slow("torch-network")])
 def test_a_program_that_takes_contexts_answers_each_goal_in_its_own(name):
-    robot, goals = others.robot_of("toss")
-    winds, rng = np.linspace(0, 1, len(goals))[:, None], np.random.default_rng(0)
-    low, high = robot.contexts.low, robot.contexts.high
-    rival = others.RIVALS[name](robot, winds, (goals - robot.outcomes.low) / robot.outcomes.sides, 1000)
-    for _ in range(200):
-        wind = rng.random(1)
-        theta = rival.move(wind)
-        outcome = robot.execute(low + wind * (high - low), theta, rng)
-        rival.tell(wind, theta, (outcome - robot.outcomes.low) / robot.outcomes.sides)
+    robot, goals = programs.robot_of("toss")
+    winds = np.linspace(0, 1, len(goals))[:, None]
+    rival, errors = live(name, robot, goals, 200, winds)
+    elsewhere = missed(robot, winds[::-1], rival.answers(), goals, np.random.default_rng(1))
+    assert errors.mean() < 0.8 * elsewhere.mean()
 
-    def error(blowing):
-        landed = [robot.execute(*try_, rng) for try_ in zip(low + blowing * (high - low), rival.answers(), strict=True)]
-        return np.linalg.norm(np.array(landed) - goals, axis=1).mean()
 
-    assert error(winds) < 0.8 * error(winds[::-1])
+def test_the_programs_are_those_that_are_compared_and_each_lives_where_it_can():
+    assert (*programs.RIVALS,) == others.PROGRAMS
+    keys = {life.key for life in others.lives([1000], others.ROBOTS, "out")}
+    assert ("toss", "practice", 1000) in keys
+    assert ("toss", "explauto", 1000) not in keys
+    assert {robot for robot, name, _ in keys if name == "mink"} == {"arm-5", "arm-7", "arm-50"}
 
 
 def test_without_explauto_a_line_says_how_to_install_it(arm, monkeypatch, tmp_path):
-    monkeypatch.setattr(others, "EXPLAUTO", tmp_path / "others/bin/python")
+    monkeypatch.setattr(programs, "EXPLAUTO", tmp_path / "others/bin/python")
     with pytest.raises(FileNotFoundError, match="run scripts/others"):
-        others.Explauto(arm[0], np.zeros((len(arm[1]), 0)), arm[1], 0)
+        programs.Explauto(arm[0], np.zeros((len(arm[1]), 0)), arm[1], 0)
 
 
 def test_the_table_has_both_answers_of_a_program_and_ours_once(tmp_path, few_draws):
@@ -112,6 +115,6 @@ def test_the_table_has_both_answers_of_a_program_and_ours_once(tmp_path, few_dra
 
 
 def test_a_life_has_an_error_by_both_answers_after_each_number_of_movements():
-    found = others.life("soft-arm", "cma-es-each-goal", 1000, counts=(40, 80))
+    found = programs.life("soft-arm", "cma-es-each-goal", 1000, counts=(40, 80))
     assert list(found) == [40, 80]
     assert all(0 < own < 1 and 0 < ours < own for own, ours, *_ in found.values())
