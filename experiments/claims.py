@@ -7,7 +7,7 @@ equal pages. The script lists runs that the tables lack.
 Examples:
   python experiments/claims.py                                  all pages, and the README
   python experiments/claims.py --only RESULTS                   one page
-  python experiments/claims.py --results mine --out mine        pages of your own tables, into your own folder
+  python experiments/claims.py --results mine                   pages of your own tables, beside them
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ with loading():  # Ctrl-C shows no traceback
     import robots
     from evidence import Evidence
     from page_tables import Page
-    from sgimd_torch.files import make_folder, write_text
+    from sgimd_torch.files import write_text
     from table import ResultsError
 
 README: Final = "README"
@@ -61,27 +61,16 @@ def into_readme(text: str, section: str) -> str:
     return f"{before}{BEGIN}\n{section}{END}{after}"
 
 
-def _check_place(path: Path) -> None:
-    """Raise a ResultsError if ``path`` is a file that this script has not made, and must not overwrite."""
-    if path.is_file() and not path.read_bytes().startswith(MADE.encode()):
-        raise ResultsError(
-            f"{path} was not made by claims.py and is left as it is; move it away, or name another --out"
-        )
-
-
 def main(argv: Sequence[str] | None = None) -> int:
     """Make the pages; if the tables are damaged, the exit code is 2 and no page is changed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     results = Path("results")
-    parser.add_argument("--results", type=Path, default=results, help="folder of the tables (default: %(default)s)")
-    where = "folder of the pages; only with the default, the README changes, too (default: %(default)s)"
-    parser.add_argument("--out", type=Path, default=results, help=where)
+    where = "folder of the tables and pages; only with the default, the README changes, too (default: %(default)s)"
+    parser.add_argument("--results", type=Path, default=results, help=where)
     parser.add_argument("--only", choices=PAGES, help="page to make (default: all)")
     options = parser.parse_args(argv)
-    names = [name for name in PAGES if options.only in (None, name) and (name != README or options.out == results)]
-    paths = {name: Path("README.md") if name == README else options.out / f"{name}.md" for name in names}
-    for name in {*names} - {README}:
-        _check_place(paths[name])
+    names = [name for name in PAGES if options.only in (None, name) and (name != README or options.results == results)]
+    paths = {name: Path("README.md") if name == README else options.results / f"{name}.md" for name in names}
     evidence, texts = Evidence.of(options.results), dict[Path, str]()
     for name in names:
         text, page = filled(name, evidence, options.results)
@@ -96,7 +85,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         )
         if page.missing:
             say(f"{name}: not run: {'; '.join(dict.fromkeys(page.missing))}")
-    make_folder(options.out)
     for path, text in texts.items():
         write_text(path, text)
     return 0

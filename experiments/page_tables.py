@@ -26,22 +26,6 @@ from table import LEARNING, read_table
 from variants import ARMS, EXPERIMENTS, VARIANTS
 
 MISSING_CELL: Final = "–"
-# Three variants of each rival: without a teacher, with a demonstration every 30 movements, with all at the start.
-RIVALS: Final[Mapping[str, tuple[str, str, str]]] = {
-    "practice": ("practice", "practice-taught-every-30", "practice-taught"),
-    "practice, first movements uniform": ("practice-wide", "", ""),
-    "SAGG-RIAC; SGIM-D": ("sagg-riac", "sgim-d", "sgim-d-once"),
-    "the standard baseline": (UNIFORM, "uniform-nearest-taught", "uniform-nearest-taught-once"),
-    "CMA-MAE": ("cma-mae", "cma-mae-taught", "cma-mae-taught-once"),
-    "MAP-Elites": ("map-elites", "map-elites-taught", "map-elites-taught-once"),
-    "CMA-ME": ("cma-me", "cma-me-taught", ""),
-    "Random; Imitation": ("random", "imitation", ""),
-    "CMA-ME, CMA-MAE, tuned": ("cma-me-tuned", "cma-mae-taught-tuned", ""),
-    "MAP-Elites, tuned": ("map-elites-tuned", "", ""),
-    "Random, from the middle": ("random-middle", "", ""),
-    "MAP-Elites, from the middle": ("map-elites-middle", "", ""),
-    "Goal babbling from home": ("home-babbling", "", ""),
-}
 # Steps from random movements to the algorithm practice, each added to the step before.
 GAIN: Final[Mapping[str, str]] = {
     "random movements": "random",
@@ -153,14 +137,9 @@ class Page:
         self.verdicts += [verdict for verdict in verdicts if verdict.verdict != MISSING]
         return verdicts
 
-    def rivals(self) -> str:
-        """Errors of each rival after 1000 and 5000 movements: without a teacher, and with each teaching schedule."""
-        rows = [
-            [label, *(", ".join(self.errors(name, (1000, LAST))) if name else MISSING_CELL for name in names)]
-            for label, names in RIVALS.items()
-        ]
-        head = ("learner", "no teacher", "one every 30, ten imitations each", "all at the start, once each")
-        return markdown(head, rows)
+    def rival(self, *names: str) -> str:
+        """Cells of a row: errors of each learner after 1000 and 5000 movements; a learner without a name is a dash."""
+        return " | ".join(", ".join(self.errors(name, (1000, LAST))) if name else MISSING_CELL for name in names)
 
     def suite(self, at: int = 1000) -> str:
         """Errors divided by the error of random movements: on each task, and as interquartile mean over tasks."""
