@@ -143,13 +143,9 @@ class Page:
 
     def suite(self, at: int = 1000) -> str:
         """Errors divided by the error of random movements: on each task, and as interquartile mean over tasks."""
-        learners = ("practice", UNIFORM, "map-elites")
-        known = {name: [task for task in TASKS if on(name, task) in VARIANTS] for name in learners}
-        rows = [
-            [titled(task), *(self._over_tasks(name, [task], at) if task in known[name] else "–" for name in learners)]
-            for task in TASKS
-        ]
-        rows.append(["mean over tasks", *(self._over_tasks(name, known[name], at) for name in learners)])
+        learners = ("practice", UNIFORM)
+        tasks = {**{titled(task): [task] for task in TASKS}, "mean over tasks": [*TASKS]}
+        rows = [[title, *(self._over_tasks(name, of, at) for name in learners)] for title, of in tasks.items()]
         return markdown(("task", *learners), rows)
 
     def gain(self) -> str:

@@ -29,17 +29,11 @@ INVERSE: Final[Variant] = {"inverse": "paper"}  # the letter of the paper for le
 VARIED: Final[Variant] = {**INVERSE, "exact_first": False}  # the same for imitation
 LARGE: Final[Variant] = {"environment.task_space": 100.0}
 BASELINE: Final[Variant] = {"goals": "uniform", "inverse": "nearest", "search": "perturb"}  # standard baseline
-SCHOOL: Final = ("map-elites", "cma-mae")  # algorithms of quality diversity; they take no context
 ONCE: Final[Variant] = {"teacher": "initial", "teacher.every": 1}  # at the start, one demonstration a movement
 PRACTICE: Final[Variant] = {"algorithm": "practice"}
 WIDE: Final[Variant] = {**PRACTICE, "explore.uniform": 1.0}  # the first movements are uniform, too
 TAUGHT: Final[Variant] = {"algorithm": "practice-taught", **ONCE}
-UNTAUGHT: Final[dict[str, Variant]] = {
-    "random": {"algorithm": "random"},
-    UNIFORM: REFERENCES[UNIFORM],
-    "map-elites": {"algorithm": "map-elites"},
-    "cma-mae": {"algorithm": "cma-mae"},
-}
+UNTAUGHT: Final[dict[str, Variant]] = {"random": {"algorithm": "random"}, UNIFORM: REFERENCES[UNIFORM]}
 # Steps from the standard baseline to `practice`.
 MIDDLE: Final[Variant] = {**REFERENCES[UNIFORM], "explore": "returning"}
 # SGIM-D with a forward model that answers once it predicts as well as `process`, and with one that answers untested.
@@ -72,12 +66,12 @@ def _of_teacher(teacher: int, ending: str = "") -> dict[str, Variant]:
 
 
 def _on_tasks(learners: dict[str, Variant], tasks: Iterable[str]) -> dict[str, Variant]:
-    """Each learner on each task except the rod; quality diversity also without contexts and rare effects."""
+    """Each learner on each task except the rod."""
     return {
         f"{name}.{task}": {**line, **TASKS[task].options, **SHORT}
         for task in tasks
         for name, line in learners.items()
-        if task != ROD and not (name in SCHOOL and task in ("toss", *SPARSE))
+        if task != ROD
     }
 
 
@@ -113,7 +107,9 @@ EXPERIMENTS: Final[dict[str, dict[str, Variant]]] = {
     "rivals": {
         name: {**line, **WHOLE}
         for name, line in {
-            **{name: line for name, line in UNTAUGHT.items() if name != "random"},
+            UNIFORM: REFERENCES[UNIFORM],
+            "cma-mae": {"algorithm": "cma-mae"},
+            "map-elites": {"algorithm": "map-elites"},
             "uniform-nearest-taught": {**SGIM_D, **BASELINE},
             "uniform-nearest-taught-once": {**SGIM_D, **BASELINE, **ONCE, "social.repeats": 1},
             "sgim-d-uniform": {**SGIM_D, "goals": "uniform"},

@@ -51,7 +51,6 @@ SPOILT = {
         6: {"practice.toss": {500: 2.2}},
         7: {"practice.swimmer": {250: 1.8}},
         8: dict.fromkeys([claimed.on("uniform-nearest", task) for task in claimed.SUITE], 0.3),
-        9: {claimed.on("map-elites", task): {1000: 0.4} for task in claimed.SUITE},
     },
     "curiosity": {
         0: {"sgim-d-uniform": 0.5},

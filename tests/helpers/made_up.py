@@ -22,7 +22,7 @@ LETTER = {  # errors (m) after 5000 movements; learners by the letter of the pap
     "sagg-riac-large": 0.19,
     "sgim-d-large": 0.09,
 }
-ON_TASKS = {"random": 2.0, "uniform-nearest": 1.5, "cma-mae": 1.4, "map-elites": 1.3}
+ON_TASKS = {"random": 2.0, "uniform-nearest": 1.5}
 
 
 def lettered(name):
@@ -49,10 +49,9 @@ ERRORS = {  # errors (m) after 5000 movements by name, as in `Evidence`
     "map-elites": 0.05,
     "uniform-nearest": 0.08,
     "sgim-d-uniform": 0.10,
-    **{f"{name}.{task}": error for name, error in ON_TASKS.items() for task in SUITE if task != "rod"},
+    **{f"{name}.{task}": error for name, error in ON_TASKS.items() for task in (*SUITE, *SPARSE) if task != "rod"},
     **{f"practice.{task}": 1.0 for task in (*SUITE, *SPARSE) if task != "rod"},
     "practice.rod-large": 0.015,
-    **{f"{name}.{task}": ON_TASKS[name] for name in ("random", "uniform-nearest") for task in SPARSE},
     **{f"sagg-riac.{task}": 1.5 for task in SPARSE},
     # With a forward model.
     **{f"sgim-d-model{by}": 0.03 for by in ("-alone by model-alone", " by model")},
