@@ -83,10 +83,9 @@ def kinds(evidence: Evidence) -> Figure:
 
 def changes(evidence: Evidence) -> Figure:
     """Errors after a change over those of a learner that starts anew: a panel for each robot, numbers in cells."""
-    figure = Figure(figsize=(9.5, 7.5), layout="constrained")
-    panels = figure.subplots(2, 3, sharey=True)
-    panels.flat[-1].remove()
-    for ax, robot in zip(panels.flat, ROBOTS, strict=False):
+    figure = Figure(figsize=(7.5, 4), layout="constrained")
+    panels = figure.subplots(1, len(ROBOTS), sharey=True)
+    for ax, robot in zip(panels, ROBOTS, strict=True):
         times = after(robot)
         cells = np.array(
             [[over_anew(evidence, robot, change, at, level=None).value for at in times] for change in CHANGES]

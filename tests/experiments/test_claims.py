@@ -4,7 +4,7 @@ import pytest
 
 import claimed
 import robots
-from changing import ARM, SIMULATOR
+from changing import ARM, RANDOM_ROBOTS, SIMULATOR
 from evidence import Evidence, NotRun
 from judging import judge
 from made_lives import write_lives
@@ -92,10 +92,10 @@ ROBOTS = {
     ("any_robot", 2): lambda number, *key: 0.2 if key == ("sagg-riac", 50) else 1,
     ("any_robot", 3): lambda number, *key: 0.2 if key == ("uniform-nearest", 50) else 1,
     ("any_robot", 4): lambda number, *key: 0.2 if key == ("practice-interest", 50) else 1,
-    ("changes", 0): lambda *key: 3 if key[0] == "toss" and key[2:] == ("goes-on", 250) else 1,
-    ("changes", 1): lambda *key: 4 if key == ("crawler", "swap", "goes-on", 500) else 1,
+    ("changes", 0): lambda *key: 3 if key[0] == RANDOM_ROBOTS and key[2:] == ("goes-on", 250) else 1,
+    ("changes", 1): lambda *key: 4 if key == (RANDOM_ROBOTS, "swap", "goes-on", 500) else 1,
     ("changes", 2): lambda *key: 0 if key[1:3] == ("gradual", "noticed") else 1,
-    ("changes", 3): lambda *key: 0.3 if key == ("toss", "noise", "blind", 100) else 1,
+    ("changes", 3): lambda *key: 0.3 if key == (RANDOM_ROBOTS, "noise", "blind", 100) else 1,
     ("changes", 4): lambda *key: 1.5 if key == (ARM, SIMULATOR, "goes-on", 50) else 1,
     ("changes", 5): lambda *key: 3 if key == (ARM, SIMULATOR, "wrong", 1000) else 1,
 }

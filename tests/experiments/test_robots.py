@@ -9,7 +9,7 @@ import pytest
 
 import random_robots
 import robots
-from changing import FIRST_RANDOM, GRADUAL, UNDONE, Changing, errors, robot_of
+from changing import FIRST_RANDOM, GRADUAL, RANDOM_ROBOTS, UNDONE, Changing, errors, robot_of
 from evidence import Evidence, NotRun
 from lives import Life, collect
 from made_lives import write_lives
@@ -146,7 +146,7 @@ def test_robots_are_named_by_their_numbers(tmp_path):
 
 def test_the_learner_of_before_is_compared_with_the_one_that_starts_anew(tmp_path):
     found = found_in(tmp_path)
-    assert robots.over_anew(found, "toss", "gain", 250, level=None).value == pytest.approx(0.4)
+    assert robots.over_anew(found, RANDOM_ROBOTS, "gain", 250, level=None).value == pytest.approx(0.4)
     with pytest.raises(NotRun, match="goes-on after gain of fishing-rod at 1000"):
         robots.over_anew(found, "fishing-rod", "gain", 1000)
 
