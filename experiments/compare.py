@@ -53,16 +53,16 @@ NAMES: Final[dict[str, Collection[str]]] = {
 # Estimates of processor time (ms) of a movement, evaluations included. The order is that in which runs are made.
 COST: Final = {
     "paper": 3.0,
-    "letter": 5.0,
+    "letter": 3.5,
     "large": 6.0,
-    "teachers": 6.0,
+    "teachers": 2.5,
     "practice": 5.5,
     "robots": 4.0,
     "rivals": 5.0,
     "model": 13.0,
     "changes": 4.0,
-    "suite": 6.5,
-    "others": 4.0,
+    "suite": 3.0,
+    "others": 6.0,
     "asking": 9.0,
 }
 EXAMPLES: Final = f"""experiments: {", ".join(COST)}
