@@ -133,7 +133,7 @@ FILES: Final = (
     File("pybullet_data/xarm/xarm6_robot.urdf", "body:link6", "balanceinertia"),
     File("pybullet_data/mini_cheetah/mini_cheetah.urdf", "body:toe_fr", "balanceinertia"),
     File("pybullet_data/laikago/laikago_toes.urdf", "body:toeRL", "boundinertia"),
-    File("pybullet_data/husky/husky.urdf", "body:base_link", "bad format"),
+    File("pybullet_data/husky/husky.urdf", "body:base_link", "a template of xacro"),
     File("pybullet_data/mjcf/hopper.xml", "body:foot", "global coordinates no longer supported"),
     File("pybullet_data/kuka_iiwa/model.sdf", "body:lbr_iiwa_link_7", "is an SDF file"),
 )
