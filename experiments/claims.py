@@ -69,6 +69,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--results", type=Path, default=results, help=where)
     parser.add_argument("--only", choices=PAGES, help="page to make (default: all)")
     options = parser.parse_args(argv)
+    if not options.results.is_dir():
+        raise ResultsError(f"there is no folder {options.results}; name one in which compare.py has written its tables")
     names = [name for name in PAGES if options.only in (None, name) and (name != README or options.results == results)]
     paths = {name: Path("README.md") if name == README else options.results / f"{name}.md" for name in names}
     evidence, texts = Evidence.of(options.results), dict[Path, str]()

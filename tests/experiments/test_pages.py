@@ -87,6 +87,12 @@ def test_rows_of_ones_own_make_pages_and_leave_the_readme_alone(tmp_path, monkey
     assert [path.name for path in tmp_path.iterdir()] == ["mine"]
 
 
+def test_a_folder_that_is_not_there_is_named_and_not_made(tmp_path, capsys):
+    assert command(main, ["--results", str(tmp_path / "mien")]) == 2
+    assert "mien; name one in which compare.py" in capsys.readouterr().err
+    assert not [*tmp_path.iterdir()]
+
+
 def test_a_readme_without_a_section_of_results_is_refused_and_left_alone(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     Path("results").symlink_to(SHIPPED)
