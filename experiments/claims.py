@@ -1,13 +1,12 @@
-"""Make the pages in results/ and the README's section of results from templates and from the tables of results.
+"""Make the pages in results/ and the README from templates and from the tables of results.
 
 The text of each page is a template in experiments/pages/. Change the template, not the page. --results has the tables
 that compare.py writes, results.csv and smaller ones. Intervals are bootstrapped with a fixed seed, so equal tables give
 equal pages. The script lists runs that the tables lack.
 
 Examples:
-  python experiments/claims.py                                  all pages, and the README
-  python experiments/claims.py --only RESULTS                   one page
-  python experiments/claims.py --results mine                   pages of your own tables, beside them
+  python experiments/claims.py                  all pages, and the README
+  python experiments/claims.py --results mine   pages of your own tables, beside them
 """
 
 from __future__ import annotations
@@ -35,9 +34,6 @@ with loading():  # Ctrl-C shows no traceback
 README: Final = "README"
 TEMPLATES: Final = Path(__file__).with_name("pages")
 PAGES: Final = sorted(path.name.partition(".")[0] for path in TEMPLATES.glob("*.md.j2"))
-MADE: Final = "<!-- Made by experiments/claims.py"
-BEGIN: Final = "<!-- results: made by experiments/claims.py from experiments/pages/README.md.j2 -->"  # of the section
-END: Final = "<!-- end -->"  # of the section
 
 
 def filled(name: str, evidence: Evidence, folder: Path) -> tuple[str, Page]:
@@ -48,47 +44,27 @@ def filled(name: str, evidence: Evidence, folder: Path) -> tuple[str, Page]:
     return environment.get_template(f"{name}.md.j2").render(page=page, claimed=claimed, robots=robots), page
 
 
-def into_readme(text: str, section: str) -> str:
-    """The ``text`` of a README with a new ``section`` of results.
-
-    Raises:
-        ResultsError: the README has no such section.
-    """
-    before, begin, rest = text.partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if not begin or not end:
-        raise ResultsError(f"the README must have a section from {BEGIN} to {END}; was it edited?")
-    return f"{before}{BEGIN}\n{section}{END}{after}"
-
-
 def main(argv: Sequence[str] | None = None) -> int:
     """Make the pages; if the tables are damaged, the exit code is 2 and no page is changed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     results = Path("results")
     where = "folder of the tables and pages; only with the default, the README changes, too (default: %(default)s)"
     parser.add_argument("--results", type=Path, default=results, help=where)
-    parser.add_argument("--only", choices=PAGES, help="page to make (default: all)")
     options = parser.parse_args(argv)
     if not options.results.is_dir():
         raise ResultsError(f"there is no folder {options.results}; name one in which compare.py has written its tables")
-    names = [name for name in PAGES if options.only in (None, name) and (name != README or options.results == results)]
-    paths = {name: Path("README.md") if name == README else options.results / f"{name}.md" for name in names}
     evidence, texts = Evidence.of(options.results), dict[Path, str]()
-    for name in names:
+    for name in PAGES:
+        if name == README and options.results != results:
+            continue
         text, page = filled(name, evidence, options.results)
-        if name == README:
-            text = into_readme(paths[name].read_text(encoding="utf-8"), text)
-        else:
-            text = f"{MADE} from experiments/pages/{name}.md.j2; change that file, not this one. -->\n\n{text}"
-        texts[paths[name]] = text
-        verdicts = [verdict.verdict for verdict in page.verdicts]
-        print(
-            f"{name}: {', '.join(f'{verdicts.count(word)} {word}' for word in dict.fromkeys(verdicts)) or 'no claims'}"
-        )
+        text = f"<!-- Made by experiments/claims.py; change experiments/pages/{name}.md.j2. -->\n\n{text}"
+        texts[(Path() if name == README else options.results) / f"{name}.md"] = text
         if page.missing:
             say(f"{name}: not run: {'; '.join(dict.fromkeys(page.missing))}")
     for path, text in texts.items():
         write_text(path, text)
+        print(path)
     return 0
 
 

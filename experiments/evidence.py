@@ -2,8 +2,7 @@
 
     evidence = Evidence.of(Path("results")); interval_text(evidence.ratio("sgim-d", "random"))
 A name is that of a variant, whose errors are those with the inverse model `process`; "sgim-d-letter by paper" names
-another inverse model. Two names, "ours" and "theirs", are compared on their common seeds. If no seed is common, they
-are compared as independent samples.
+another inverse model. Two names, "ours" and "theirs", are compared on their common seeds.
 """
 
 from __future__ import annotations
@@ -17,13 +16,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from sgimd_torch.extras.table.statistics import (
-    LEVEL,
-    Interval,
-    bootstrap_rng,
-    interquartile_mean,
-    interval,
-)
+from sgimd_torch.extras.table.statistics import LEVEL, Interval, bootstrap_rng, interquartile_mean, interval
 from sgimd_torch.spaces import Array
 from table import read_table
 
@@ -169,17 +162,15 @@ class Evidence:
 
     def less(self, ours: pd.Series, theirs: pd.Series, *, level: Level = LEVEL) -> Interval:
         """The interquartile mean of our numbers minus theirs, both given by seed."""
-        ours, theirs, paired = _matched(ours, theirs)
 
         def difference(x: Array, y: Array) -> Array:
-            return interquartile_mean(x - y) if paired else interquartile_mean(x) - interquartile_mean(y)
+            return interquartile_mean(x - y)
 
-        return _found(difference, ours, theirs, paired=paired, level=level)
+        return _found(difference, *shared(ours, theirs), paired=True, level=level)
 
     def over(self, ours: pd.Series, theirs: pd.Series, *, level: Level = LEVEL) -> Interval:
         """The interquartile mean of our numbers divided by that of theirs, both given by seed."""
-        ours, theirs, paired = _matched(ours, theirs)
-        return _found(_ratio, ours, theirs, paired=paired, level=level)
+        return _found(_ratio, *shared(ours, theirs), paired=True, level=level)
 
     def share(self, parts: pd.Series, wholes: pd.Series, *, level: Level = LEVEL) -> Interval:
         """The sum of ``parts`` divided by the sum of ``wholes``; the bootstrap draws the same seeds for both.
@@ -206,12 +197,6 @@ def shared(ours: pd.Series, theirs: pd.Series) -> tuple[pd.Series, pd.Series]:
     if len(seeds) < 2:
         raise NotRun("fewer than two seeds in common")
     return ours.loc[seeds], theirs.loc[seeds]
-
-
-def _matched(ours: pd.Series, theirs: pd.Series) -> tuple[pd.Series, pd.Series, bool]:
-    """Both series on their common seeds, and True; if no seed is common, both whole series, and False."""
-    paired = not ours.index.intersection(theirs.index).empty
-    return *(shared(ours, theirs) if paired else (ours, theirs)), paired
 
 
 def _ratio(x: Array, y: Array) -> Array:

@@ -55,13 +55,11 @@ class Page:
         evidence: evidence of the experiments.
         folder: folder of the tables of results.
         missing: names of claims and numbers without runs; the page adds to this list while it is made.
-        verdicts: verdicts on the claims that have runs; the page adds to this list, too.
     """
 
     evidence: Evidence
     folder: Path
     missing: list[str] = field(default_factory=list)
-    verdicts: list[Verdict] = field(default_factory=list)
 
     def error(self, name: str, at: int = LAST, form: str = ".3f", *, between: bool = False) -> str:
         """The error (m), with its interval if ``between``."""
@@ -84,18 +82,15 @@ class Page:
         return f"{seeds.min()} to {seeds.max()}"
 
     def older(self, *groups: str) -> str:
-        """A sentence that names the groups of rows that an earlier version has made, wholly or in part; or nothing."""
+        """A sentence that names the groups with rows that an earlier version has made; or nothing."""
         learning = {
             "robots": self.evidence.robots["learning"],
             "changes": self.evidence.changes["learning"],
             "others": self.lives_of_others["learning"],
             **{name: self.evidence.of_variants(variants) for name, variants in EXPERIMENTS.items()},
         }
-        shares = {name: (learning[name] != LEARNING).mean() for name in groups if len(learning[name])}
-        if not any(shares.values()):
-            return ""
-        older = [f"{share:.0%} of `{name}`".replace("%", " %") for name, share in shares.items() if share]
-        return f"**{'All rows' if min(shares.values()) == 1 else ', '.join(older)}: made by an earlier version.**"
+        older = [f"`{name}`" for name in groups if (learning[name] != LEARNING).any()]
+        return f"**{', '.join(older)}: made by an earlier version, wholly or in part.**" if older else ""
 
     def ratio(self, ours: str, theirs: str, at: int = LAST) -> str:
         """Our error divided by theirs, with the interval of this ratio."""
@@ -134,7 +129,6 @@ class Page:
         """A verdict on each claim."""
         verdicts = judge(claims)
         self.missing += [verdict.claim for verdict in verdicts if verdict.verdict == MISSING]
-        self.verdicts += [verdict for verdict in verdicts if verdict.verdict != MISSING]
         return verdicts
 
     def rival(self, *names: str) -> str:

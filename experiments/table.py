@@ -15,6 +15,7 @@ from typing import Any, Final
 
 import numpy as np
 import pandas as pd
+from filelock import FileLock
 
 from sgimd_torch.evaluation import Benchmark
 from sgimd_torch.extras.asking.teachers import middle
@@ -36,7 +37,7 @@ _RATIO: Final = ("ratio", "low", "high")
 _ASKED: Final = ("requests", "shown", "late", "late_own")
 # Of each table: the number of columns that form its key, and all columns, the key first. Keys of rows are unique.
 TABLES: Final[dict[str, tuple[int, tuple[str, ...]]]] = {
-    FILE: (4, ("variant", "seed", "movements", "answer", "task", "error", "floor", "learning")),
+    FILE: (4, ("variant", "seed", "movements", "answer", "error", "floor", "learning")),
     "explored.csv": (2, ("variant", "seed", "tiles", "goals", "near", "learning")),
     "asked.csv": (3, ("variant", "seed", "teacher", *_ASKED, "learning")),
     "robots.csv": (4, ("number", "learner", "seed", "movements", "error", "noticed", "learning")),
@@ -50,7 +51,7 @@ TABLES: Final[dict[str, tuple[int, tuple[str, ...]]]] = {
 }
 TYPES: Final = {  # types of columns; all other columns have floats, and an empty field is NaN
     **dict.fromkeys(("number", "seed", "movements", "movements_then", "tiles", *_ASKED), "int64"),
-    **dict.fromkeys(("variant", "task", "answer", "teacher", "learner", "learning"), "str"),
+    **dict.fromkeys(("variant", "answer", "teacher", "learner", "learning"), "str"),
     **dict.fromkeys(("robot", "change", "search", "file", "outcome", "options", "version", "told", "words"), "str"),
     **dict.fromkeys(("goals", "near", "noticed"), "Int64"),  # with empty fields
 }
@@ -103,12 +104,7 @@ def merge(folder: Path, name: str, rows: Sequence[Row]) -> None:
     """
     make_folder(folder)
     n_key, columns = TABLES[name]
-    try:
-        import fcntl
-    except ImportError as error:  # Windows
-        raise ResultsError("experiments lock their tables as Linux and macOS do; run them there") from error
-    with open(folder / ".lock", "w") as held:
-        fcntl.flock(held, fcntl.LOCK_EX)  # waits until no other process changes a table of this folder
+    with FileLock(folder / ".lock"):  # waits until no other process changes a table of this folder
         table = read_table(folder, name)
         if rows:
             new = pd.DataFrame(rows, columns=[*columns])
@@ -132,7 +128,7 @@ def result_rows(config: Config, run: Run) -> list[Row]:
     For the learner's own inverse model, the column ``answer`` has its name in the catalogue.
     """
     rows: list[Row] = []
-    key = {"variant": config.variant, "seed": config.seed, "task": task_name(config)}
+    key = {"variant": config.variant, "seed": config.seed}
     for inverse, evaluation in run.evaluations.items():
         name = own_answer(config) if inverse == OWN else inverse
         evaluations = (evaluation[column].tolist() for column in ("movements", "mean_error", "noise_floor"))
@@ -149,16 +145,6 @@ def own_answer(config: Config) -> str:
 def answers_of(config: Config) -> tuple[str, ...]:
     """Names of the inverse models in the evaluations of a run: its own, and `process`, which answers for all."""
     return (OWN,) if own_answer(config) == ALIKE else (OWN, ALIKE)
-
-
-def task_name(config: Config) -> str:
-    """The robot's name and its options that differ from their defaults: ``fishing-rod task_space=100``."""
-    usual = Config.from_settings({"environment": config["environment"]}).values
-    options = {name.removeprefix("environment."): value for name, value in config.values.items()
-               if name.startswith("environment.") and value != usual[name]}  # fmt: skip
-    place, _, name = config["environment"].rpartition(":")
-    robot = name.replace("_", "-") if place else name
-    return " ".join([robot, *(f"{name}={value:g}" for name, value in options.items())])
 
 
 def explored_rows(config: Config, run: Run) -> list[Row]:

@@ -19,7 +19,7 @@ from sgimd_torch.record import RunError
 from sgimd_torch.runs.build import build
 from sgimd_torch.runs.program import command
 from sgimd_torch.runs.read import Run, read_run
-from table import CORNER, LEARNING, explored_rows, merge, read_table, result_rows, task_name, tiles_reached
+from table import CORNER, LEARNING, explored_rows, merge, read_table, result_rows, tiles_reached
 from variants import EXPERIMENTS, VARIANTS
 
 # Two variants that live for 40 movements, and one, of an experiment of its own, whose demonstrations are missing.
@@ -69,12 +69,9 @@ def test_each_evaluation_is_a_row_the_failed_are_reported_and_a_second_start_doe
     assert "3 runs ended well, 1 failed" in errors
     assert "Traceback" not in errors
     table = read_table(tmp_path / "results")
-    large, arm = "fishing-rod task_space=100", "planar-arm-7"
-    for variant, task in {"random": "fishing-rod", "sgim-d-large": large, "sgim-d.planar-arm-7": arm}.items():
+    for variant in ("random", "sgim-d-large", "sgim-d.planar-arm-7"):
         theirs = table[table.variant == variant]
-        assert [*zip(theirs.task, theirs.movements, theirs.answer, strict=True)] == [
-            (task, when, "process") for when in (20, 40)
-        ]
+        assert [*zip(theirs.movements, theirs.answer, strict=True)] == [(when, "process") for when in (20, 40)]
         run = read_run(tmp_path / "runs" / LEARNING / variant / "seed-000")
         assert [*theirs.error] == run.evaluations["own"]["mean_error"].tolist()
         assert theirs.floor.isna().all()  # the noise floor is measured only where a variant says so
@@ -162,16 +159,6 @@ def test_every_variant_is_a_valid_run_with_its_own_name(tmp_path):
 
 def test_shipped_rows_are_of_variants_that_are_there():
     assert {*read_table(ROOT / "results").variant} <= {*VARIANTS}
-
-
-def test_a_task_is_the_robot_and_what_is_not_as_usual_about_it():
-    names = {
-        "fishing-rod": {},
-        "fishing-rod task_space=100": {"environment.task_space": 100.0},
-        "fishing-rod noise=0": {"environment.noise": 0.0},
-        "planar-arm-50": {"environment": "planar-arm-50"},
-    }
-    assert [task_name(Config(parts=parts)) for parts in names.values()] == [*names]
 
 
 def test_a_run_is_evaluated_by_its_own_inverse_and_by_the_one_that_answers_for_all(tmp_path):

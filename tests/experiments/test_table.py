@@ -1,6 +1,5 @@
 """The tables of results: numbers kept exactly, no row twice, what makes no sense refused."""
 
-import sys
 from pathlib import Path
 
 import pytest
@@ -27,12 +26,6 @@ def test_a_row_made_again_takes_the_place_of_the_old_one_and_the_others_stay(tmp
     assert [*table.seed] == [0, 1]
     assert [*table.error] == [0.1 + 0.2, 0.5]
     assert table.floor.isna().all()
-
-
-def test_without_locks_of_files_a_table_is_not_changed_and_one_line_says_why(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "fcntl", None)  # as on Windows
-    with pytest.raises(ResultsError, match="lock their tables as Linux and macOS do"):
-        merge(tmp_path, FILE, [row("grid", 1, 20, "linear", 0.1)])
 
 
 def test_rows_of_other_learning_give_way_to_the_first_new_row_of_their_variant_and_of_no_other(tmp_path):

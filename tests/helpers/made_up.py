@@ -82,9 +82,9 @@ def error(name, seed, movements, last=None):
     return (ERRORS[name] if last is None else last) * spread(name, seed) * (0.8 + 0.2 * 5000 / movements)
 
 
-def row(variant, seed, movements, answer, error, floor=None, task="fishing-rod", learning=LEARNING):
+def row(variant, seed, movements, answer, error, floor=None, learning=LEARNING):
     """A row of results.csv."""
-    values = (variant, seed, movements, answer, task, error, floor, learning)
+    values = (variant, seed, movements, answer, error, floor, learning)
     return dict(zip(TABLES[FILE][1], values, strict=True))
 
 
