@@ -63,7 +63,7 @@ COST: Final = {
     "changes": 4.0,
     "suite": 3.0,
     "others": 6.0,
-    "asking": 9.0,
+    "asking": 5.5,
 }
 EXAMPLES: Final = f"""experiments: {", ".join(COST)}
 

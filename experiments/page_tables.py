@@ -188,19 +188,19 @@ class Page:
         """The table of other people's programs."""
         return read_table(self.folder, OTHERS)
 
-    def other(self, robot: str, name: str, at: int, *columns: str) -> str:
-        """Errors of a program on a robot: of its own answers, "error", and of ours, "ours"."""
+    def other(self, robot: str, name: str, at: int, *columns: str, form: str = ".3f") -> str:
+        """Numbers of a program on a robot, such as errors of its own answers, "error", and of ours, "ours"."""
         table = self.lives_of_others
         lives = table[(table.robot == robot) & (table.learner == name) & (table.movements == at)]
-        numbers = [f"{interquartile_mean(lives[column]):.3f}" for column in columns if len(lives)]
+        numbers = [f"{interquartile_mean(lives[column]):{form}}" for column in columns if len(lives)]
         return ", ".join(numbers) or MISSING_CELL
 
-    def others(self, *counts: int) -> str:
-        """Errors of other people's programs, by their own answers and by `process`."""
+    def others(self, *counts: int, columns: Sequence[str] = ("error", "ours"), form: str = ".3f") -> str:
+        """Numbers of other people's programs: errors by their own answers and by `process`, or times."""
         rows, names = [], [name for name in PROGRAMS if name != KNOWS]
         for robot, at in product(dict.fromkeys(self.lives_of_others.robot), counts):
-            cells = [self.other(robot, name, at, *("error", "ours")[: 2 - (name == OURS)]) for name in names]
-            rows.append([f"{robot}, {at}", *cells])
+            of = {name: [column for column in columns if (name, column) != (OURS, "ours")] for name in names}
+            rows.append([f"{robot}, {at}", *(self.other(robot, name, at, *of[name], form=form) for name in names)])
         return markdown(("robot, movements", *(f"`{name}`" for name in names)), rows)
 
     def asking(self) -> str:
