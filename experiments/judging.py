@@ -63,7 +63,7 @@ class Claim(NamedTuple):
 
 
 class Verdict(NamedTuple):
-    """A verdict; ``number`` is that of the part farthest on the wrong side of its bar, with a 95 % interval."""
+    """A verdict; ``number`` is that of the part whose interval (95 %) ends farthest on the wrong side of its bar."""
 
     claim: str
     number: str
@@ -142,7 +142,7 @@ def _verdict(claim: Claim, level: float) -> str:
 
 
 def _number(claim: Claim) -> str:
-    part = max(claim.parts, key=lambda part: part.above / max(abs(part.bar), 1e-3))
+    part = max(claim.parts, key=lambda part: _above(part, LEVEL)[2] / max(abs(part.bar), 1e-3))
     return interval_text(part.measured(), part.form).replace("-", "−") + (f" ({part.name})" if part.name else "")
 
 

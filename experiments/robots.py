@@ -225,12 +225,13 @@ def models(page: Page) -> str:
     )
     packages = dict.fromkeys(f"{row['file'].partition('/')[0]} {row['version']}" for row in rows)
     counts = [f"{(table['told'] == word).sum()} {word}" for word in (RIGHT, WARNED, REFUSED)]
+    mean = page.cell(times_random_on_models, page.evidence, form=".2f")
     return (
         f"`sgimd check` on {len(rows)} places in {table['file'].nunique()} unchanged files of {', '.join(packages)}: "
-        f"{', '.join(counts)}; {right} as reading them tells ([rows](model_files.csv)). After 500 movements, at goals "
-        "that postures reach if the joints alone say where the place is, or else all over T, `practice` errs "
-        f"{page.cell(times_random_on_models, page.evidence, form='.2f')} times as much as random movements in the mean "
-        f"of {len(learnt)}, worse by its interval on {(learnt['low'] > 1).sum()}."
+        f"{', '.join(counts)}, of these {right} as we expected from reading them ([rows](model_files.csv)). After 500 "
+        "movements, at goals that postures reach if the joints alone say where the place is, or else all over T, "
+        f"`practice` errs {mean} times as much as random movements in the mean of {len(learnt)}, worse by its interval "
+        f"on {(learnt['low'] > 1).sum()}."
     )
 
 

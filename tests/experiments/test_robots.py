@@ -155,7 +155,10 @@ def test_model_files_are_counted_by_what_is_told_and_errors_on_them_compared(tmp
     files = [File("dm_control/arm.xml", "site:tip"), File("robosuite/arm.xml", "geom:x", "cannot")]
     monkeypatch.setattr(robots, "FILES", files)
     said = robots.models(Page(found_in(tmp_path), tmp_path))
-    assert "2 places in 2 unchanged files of dm_control 1.0, robosuite 1.5: 1 right, 0 warned, 1 refused; 1 as" in said
+    assert (
+        "2 places in 2 unchanged files of dm_control 1.0, robosuite 1.5: 1 right, 0 warned, 1 refused, of these 1 as"
+        in said
+    )
     assert "errs 0.80 times as much as random movements in the mean of 1, worse by its interval on 0." in said
 
 
