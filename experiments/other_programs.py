@@ -14,7 +14,7 @@ import sys
 import time
 import warnings
 from collections.abc import Callable, Collection, Iterable
-from contextlib import closing
+from contextlib import closing, suppress
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -263,8 +263,9 @@ class Mink(Rival):
             posture.update(arm.angles(begin))
             place = arm.outcomes.low + goal * arm.outcomes.sides
             task.set_target(mink.SE3.from_translation(np.array([*place, 0.0])))
-            for _ in range(200):
-                posture.integrate_inplace(mink.solve_ik(posture, [task], 0.5, "daqp", limits=within), 0.5)
+            with suppress(mink.NoSolutionFound):  # the posture so far answers
+                for _ in range(200):
+                    posture.integrate_inplace(mink.solve_ik(posture, [task], 0.5, "daqp", limits=within), 0.5)
             return np.asarray(arm.correspondence([0.0], [np.clip(posture.q, -limits, limits)]))
 
         return np.array([answer(*wanted) for wanted in zip(self.goals, self.begins(1)[:, 0], strict=True)])
