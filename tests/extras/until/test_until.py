@@ -1,6 +1,7 @@
 """``sgimd run --until``: a run ends once the learner expects small errors, and stays ended; the errors are found."""
 
 import re
+from shutil import copytree
 
 import numpy as np
 import pytest
@@ -66,12 +67,12 @@ def test_the_expected_error_is_the_one_that_is_found(early):
 
 
 @pytest.mark.parametrize("words", [[], ["--movements=400"]])
-def test_a_run_that_ended_early_stays_ended_when_it_is_resumed(early, words, capsys):
-    before = content_of(path_of(early))
-    assert go(early, "--until=0.03", "--resume", *words) == 0
+def test_a_run_that_ended_early_stays_ended_when_it_is_resumed(early, words, capsys, tmp_path):
+    copytree(early, tmp_path, dirs_exist_ok=True)
+    assert go(tmp_path, "--until=0.03", "--resume", *words) == 0
     assert "150 movements, mean error" in capsys.readouterr().out
-    assert content_of(path_of(early)) == before
-    assert read_run(path_of(early)).summary["finished"]
+    assert content_of(path_of(tmp_path)) == content_of(path_of(early))
+    assert read_run(path_of(tmp_path)).summary["finished"]
 
 
 def test_without_its_limit_or_with_a_lower_one_the_run_goes_on_as_if_it_had_never_ended(tmp_path, whole):
