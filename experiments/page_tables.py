@@ -197,11 +197,13 @@ class Page:
 
     def others(self, *counts: int, columns: Sequence[str] = ("error", "ours"), form: str = ".3f") -> str:
         """Numbers of other people's programs: errors by their own answers and by `process`, or times."""
-        rows, names = [], [name for name in PROGRAMS if name != KNOWS]
-        for robot, at in product(dict.fromkeys(self.lives_of_others.robot), counts):
-            of = {name: [column for column in columns if (name, column) != (OURS, "ours")] for name in names}
-            rows.append([f"{robot}, {at}", *(self.other(robot, name, at, *of[name], form=form) for name in names)])
-        return markdown(("robot, movements", *(f"`{name}`" for name in names)), rows)
+        own = [column for column in columns if column != "ours"]  # all that practice has: its answers are by `process`
+        of = {name: own if name == OURS else columns for name in PROGRAMS if name != KNOWS}
+        rows = [
+            [f"{robot}, {at}", *(self.other(robot, name, at, *of[name], form=form) for name in of)]
+            for robot, at in product(dict.fromkeys(self.lives_of_others.robot), counts)
+        ]
+        return markdown(("robot, movements", *(f"`{name}`" for name in of)), rows)
 
     def asking(self) -> str:
         """Errors on the rod, and numbers of demonstrations, of learners that ask and of others; the best come first."""

@@ -3,8 +3,7 @@
 The reference with uniform goals makes one movement for each goal, the nearest exemplar plus noise. In evaluations the
 nearest exemplar answers for both references. Options of sgimd run choose the learner; --vary, as in sgimd sweep,
 compares several learners. Each task has a table like that of sgimd table, in the unit of the task. The last column is
-the error minus the error of random movements. The tasks on which no default of this library was
-chosen are marked "new".
+the error minus the error of random movements. Tasks on which no default of this library was chosen are marked "new".
 
   python experiments/suite.py                                             the default learner, tasks without physics
   python experiments/suite.py --seeds 0-9 --movements 2000 --out study    runs go to study/TASK/NAME/seed-000
